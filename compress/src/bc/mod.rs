@@ -1,0 +1,228 @@
+//! BC1, BC3 and BC4: block textures that graphics hardware samples directly, here for volumes.
+//!
+//! **Order** is that of a *sliced* 3D texture, which Vulkan and WebGPU read: blocks of 4×4×1 voxels, block x
+//! fastest, then block y, then z. A volume of any extent is covered; where a block reaches over the far edge in x
+//! or y, the last voxel is repeated, which costs the encoder nothing and never bleeds another colour into the
+//! edge. **Work** is gathered in units of 4×4×4 voxels as Doi does, four blocks one behind the other, since
+//! neighbours in z are alike; rows of units are spread over threads, and the bytes are the same for any number of
+//! threads.
+//!
+//! **Samples** are 4 bytes a voxel, R G B A, for [`BlockFormat::Bc1`] and [`BlockFormat::Bc3`], and 1 byte for
+//! [`BlockFormat::Bc4`]; `[x, y, z]`, x fastest. BC1 is written in its opaque mode of four colours, alpha is not
+//! kept; its decoder knows the other mode too, where index 3 is transparent black.
+//!
+//! **Rounding.** The standard gives the interpolated values as fractions; the decoders here round them to the
+//! nearest 8-bit value once, at the end. Hardware may differ by 1 or 2.
+//!
+//! Parts: `block` gathers and scatters, `endpoints` holds the fits, `bc1`, `bc3`, `bc4` the bits of each format.
+//!
+//! Source: KDFS, chapters "S3TC Compressed Texture Image Formats" and "RGTC Compressed Texture Image Formats".
+
+mod bc1;
+mod bc3;
+mod bc4;
+mod block;
+mod endpoints;
+
+use thiserror::Error;
+
+use crate::Extent3;
+
+/// A block format. The set is closed: its members stand in files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum BlockFormat {
+    /// Colour of 5:6:5 bits at two end points, 2-bit indices; opaque.
+    Bc1,
+    /// Colour as in BC1, alpha as in BC4.
+    Bc3,
+    /// One channel: two 8-bit end points, 3-bit indices; unsigned.
+    Bc4,
+}
+
+impl BlockFormat {
+    /// Every format.
+    pub const ALL: [Self; 3] = [Self::Bc1, Self::Bc3, Self::Bc4];
+
+    /// The format's short name: `"bc3"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bc1 => "bc1",
+            Self::Bc3 => "bc3",
+            Self::Bc4 => "bc4",
+        }
+    }
+
+    /// Bytes of one block of 4×4×1 voxels.
+    pub fn block_bytes(self) -> usize {
+        match self {
+            Self::Bc1 | Self::Bc4 => 8,
+            Self::Bc3 => 16,
+        }
+    }
+
+    /// Bits of a block for each of its 16 voxels.
+    pub fn bits_per_voxel(self) -> usize {
+        self.block_bytes() / 2
+    }
+
+    /// Bytes of one voxel on the uncompressed side: 4 for colour, 1 for a scalar.
+    pub fn channels(self) -> usize {
+        match self {
+            Self::Bc1 | Self::Bc3 => 4,
+            Self::Bc4 => 1,
+        }
+    }
+
+    /// Bytes of a volume of `extent` in this format: `block_bytes · ⌈x/4⌉ · ⌈y/4⌉ · z`.
+    pub fn encoded_len(self, extent: Extent3) -> usize {
+        extent.block_count() * self.block_bytes()
+    }
+
+    /// Bytes of the uncompressed samples of a volume of `extent`: `channels · x · y · z`.
+    pub fn decoded_len(self, extent: Extent3) -> usize {
+        extent.voxels() * self.channels()
+    }
+}
+
+/// How the voxels of a BC3 block share in the choice of its colours.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum ColourWeight {
+    /// By their alpha: a voxel that is not seen costs the seen ones nothing. For straight (not premultiplied)
+    /// colour. Voxels of alpha 0 keep the least weight that still defines their colour.
+    #[default]
+    Alpha,
+    /// All alike: for colour that is premultiplied, and so weighted already.
+    Equal,
+}
+
+/// Choices of an encoder.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct EncodeOptions {
+    /// How voxels share in the colours of a BC3 block; of no effect in BC1, which is opaque, and BC4.
+    pub colour_weight: ColourWeight,
+}
+
+impl EncodeOptions {
+    /// These options with another weight of colours.
+    pub fn with_colour_weight(mut self, colour_weight: ColourWeight) -> Self {
+        self.colour_weight = colour_weight;
+        self
+    }
+}
+
+/// Why samples cannot be encoded.
+#[derive(Debug, Error, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum EncodeError {
+    /// The samples are not those of the extent.
+    #[error(
+        "{found} bytes of samples were given, but {} of this extent needs {expected}: give {} byte(s) a voxel",
+        .format.name(), .format.channels()
+    )]
+    Length {
+        /// The format.
+        format: BlockFormat,
+        /// Bytes that the extent needs.
+        expected: usize,
+        /// Bytes given.
+        found: usize,
+    },
+    /// There is no memory for the blocks.
+    #[error("no memory for {bytes} bytes of blocks: close other volumes or encode a part")]
+    OutOfMemory {
+        /// Bytes needed.
+        bytes: usize,
+    },
+}
+
+/// Why blocks cannot be decoded. Every bit pattern of a block is valid; only sizes can be wrong.
+#[derive(Debug, Error, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DecodeError {
+    /// The blocks are not those of the extent.
+    #[error("{found} bytes of blocks were given, but {} of this extent needs {expected}: the data are cut off or of another format", .format.name())]
+    Length {
+        /// The format.
+        format: BlockFormat,
+        /// Bytes that the extent needs.
+        expected: usize,
+        /// Bytes given.
+        found: usize,
+    },
+    /// There is no memory for the samples.
+    #[error("no memory for {bytes} bytes of samples: close other volumes or decode a part")]
+    OutOfMemory {
+        /// Bytes needed.
+        bytes: usize,
+    },
+}
+
+/// Encodes a volume with the default [`EncodeOptions`].
+///
+/// `samples` has [`BlockFormat::decoded_len`] bytes, `[x, y, z]`, x fastest; the result has
+/// [`BlockFormat::encoded_len`] bytes in sliced-3D order. Runs on the current rayon pool.
+///
+/// # Errors
+/// [`EncodeError::Length`] if `samples` has another length; [`EncodeError::OutOfMemory`].
+pub fn encode_volume(format: BlockFormat, samples: &[u8], extent: Extent3) -> Result<Vec<u8>, EncodeError> {
+    encode_volume_with(format, samples, extent, EncodeOptions::default())
+}
+
+/// Encodes a volume, see [`encode_volume`].
+///
+/// # Errors
+/// Those of [`encode_volume`].
+pub fn encode_volume_with(
+    format: BlockFormat,
+    samples: &[u8],
+    extent: Extent3,
+    options: EncodeOptions,
+) -> Result<Vec<u8>, EncodeError> {
+    let expected = format.decoded_len(extent);
+    if samples.len() != expected {
+        return Err(EncodeError::Length { format, expected, found: samples.len() });
+    }
+    let bytes = format.encoded_len(extent);
+    let mut blocks = zeroed(bytes).ok_or(EncodeError::OutOfMemory { bytes })?;
+    match format {
+        BlockFormat::Bc1 => block::encode(samples, extent, &mut blocks, bc1::encode),
+        BlockFormat::Bc3 => {
+            block::encode(samples, extent, &mut blocks, |texels| bc3::encode(texels, options.colour_weight));
+        }
+        BlockFormat::Bc4 => block::encode(samples, extent, &mut blocks, bc4::encode),
+    }
+    Ok(blocks)
+}
+
+/// Decodes a volume: the inverse of [`encode_volume`], for blocks of any encoder.
+///
+/// `blocks` has [`BlockFormat::encoded_len`] bytes in sliced-3D order; the result has
+/// [`BlockFormat::decoded_len`] bytes, `[x, y, z]`, x fastest: at most 8 times as many, so a hostile extent
+/// cannot ask for memory that its blocks do not pay for. BC1 gives alpha 255, or 0 where a block of its other
+/// mode says transparent.
+///
+/// # Errors
+/// [`DecodeError::Length`] if `blocks` has another length; [`DecodeError::OutOfMemory`].
+pub fn decode_volume(format: BlockFormat, blocks: &[u8], extent: Extent3) -> Result<Vec<u8>, DecodeError> {
+    let expected = format.encoded_len(extent);
+    if blocks.len() != expected {
+        return Err(DecodeError::Length { format, expected, found: blocks.len() });
+    }
+    let bytes = format.decoded_len(extent);
+    let mut samples = zeroed(bytes).ok_or(DecodeError::OutOfMemory { bytes })?;
+    match format {
+        BlockFormat::Bc1 => block::decode(blocks, extent, &mut samples, bc1::decode),
+        BlockFormat::Bc3 => block::decode(blocks, extent, &mut samples, bc3::decode),
+        BlockFormat::Bc4 => block::decode(blocks, extent, &mut samples, bc4::decode),
+    }
+    Ok(samples)
+}
+
+/// `len` zero bytes, or none where there is no memory for them.
+fn zeroed(len: usize) -> Option<Vec<u8>> {
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(len).ok()?;
+    bytes.resize(len, 0);
+    Some(bytes)
+}
