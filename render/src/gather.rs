@@ -1,0 +1,298 @@
+//! From a scene to what the passes read: the solids, planes, textures and tables of every fragment.
+
+use std::sync::Arc;
+
+use crate::gpu::{Gpu, GpuError};
+use crate::passes::slabs::{Kind, MAX_GAPS, Member, Proxy, Spacing, gpu_data};
+use crate::scene::{Scene, Shading, VolumeItem};
+use crate::texture::{Plan, TextureCache, VolumeTexture, is_colour};
+use crate::transfer::{NODES, ROWS, Table};
+use crate::view::{Form, View};
+use crate::volume::convex::{ConvexSolid, HalfSpace};
+use crate::volume::{Affine, Bricks, Cutter, Grid, Point, Side, Transfer, Vector};
+
+/// A fragment with its geometry in view space, before the near plane is known.
+#[derive(Debug)]
+struct Fragment {
+    texture: Arc<VolumeTexture>,
+    view_from_voxel: Affine,
+    planes: Vec<HalfSpace>,
+    cylinders: Vec<Tube>,
+    transfer: Arc<Transfer>,
+    table: usize,
+}
+
+/// A cylinder in view space.
+#[derive(Debug)]
+struct Tube {
+    point: Point,
+    across: [Vector; 2],
+    radius_mm: f64,
+    outside: bool,
+}
+
+/// What is skipped and done while gathering.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    pub(crate) bricks: u64,
+    pub(crate) bricks_occupied: u64,
+    pub(crate) fragments: u32,
+    pub(crate) fragments_empty: u32,
+}
+
+/// The scene as lists for the GPU.
+#[derive(Debug, Default)]
+pub(crate) struct Gathered {
+    fragments: Vec<Fragment>,
+    pub(crate) members: Vec<Member>,
+    pub(crate) textures: Vec<Arc<VolumeTexture>>,
+    /// Rows of all tables, [`NODES`] texels each.
+    pub(crate) tables: Vec<[f32; 4]>,
+    known_tables: Vec<(Arc<Transfer>, Table)>,
+    pub(crate) notes: Vec<String>,
+    pub(crate) counts: Counts,
+    /// Least distance of samples over all volumes drawn, mm.
+    pub(crate) finest_mm: Option<f64>,
+}
+
+/// Min-max bricks kept from frame to frame.
+#[derive(Debug, Default)]
+pub(crate) struct BrickCache {
+    kept: Vec<(Arc<Grid>, Arc<Bricks>)>,
+}
+
+impl BrickCache {
+    fn get(&mut self, grid: &Arc<Grid>) -> Arc<Bricks> {
+        if let Some((_, found)) = self.kept.iter().find(|(g, _)| Arc::ptr_eq(g, grid)) {
+            return Arc::clone(found);
+        }
+        let made = Arc::new(Bricks::of(grid));
+        self.kept.push((Arc::clone(grid), Arc::clone(&made)));
+        made
+    }
+
+    fn forget_unused(&mut self, scene: &Scene) {
+        self.kept.retain(|(g, _)| scene.volumes.iter().any(|v| Arc::ptr_eq(&v.grid, g)));
+    }
+}
+
+impl Gathered {
+    pub(crate) fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        view: &View,
+        textures: &mut TextureCache,
+        bricks: &mut BrickCache,
+    ) -> Result<Self, GpuError> {
+        let mut all = Self::default();
+        for item in &scene.volumes {
+            all.add_volume(gpu, item, view, textures, bricks)?;
+        }
+        textures.forget_unused();
+        bricks.forget_unused(scene);
+        for item in &scene.meshes {
+            if item.opacity <= 0.0 {
+                continue;
+            }
+            let [low, high] = item.mesh.bounds();
+            // A flat mesh has no solid: a hair of room makes one.
+            let room = Vector::repeat((high - low).amax() * 1e-6 + 1e-9);
+            let solid = ConvexSolid::from_box(low - room, high + room);
+            let proxy = Proxy::new(&solid.transformed(&(view.view_from_world * item.pose)));
+            all.members.extend(proxy.map(|proxy| Member { proxy, volume: None }));
+        }
+        all.notes.dedup();
+        Ok(all)
+    }
+
+    fn add_volume(
+        &mut self,
+        gpu: &Gpu,
+        item: &VolumeItem,
+        view: &View,
+        textures: &mut TextureCache,
+        bricks: &mut BrickCache,
+    ) -> Result<(), GpuError> {
+        if item.pieces.is_empty() {
+            return Ok(());
+        }
+        let bricks = bricks.get(&item.grid);
+        self.counts.bricks += bricks.len() as u64;
+        let Some((span, occupied)) = bricks.occupied(&item.transfer) else {
+            self.counts.fragments_empty += item.pieces.len() as u32;
+            return Ok(());
+        };
+        self.counts.bricks_occupied += occupied as u64;
+        let low = Point::from(span.map(|s| s[0]));
+        let high = Point::from(span.map(|s| s[1]));
+        let world_from_voxel = item.pose * *item.grid.world_from_voxel();
+        let spacing = world_from_voxel.column_lengths().into_iter().fold(f64::INFINITY, f64::min);
+        self.finest_mm = Some(self.finest_mm.map_or(spacing, |f| f.min(spacing)));
+        let table = self.table(&item.transfer);
+        for piece in &item.pieces {
+            let mut solid = ConvexSolid::from_box(low, high);
+            let view_from_unmoved = view.view_from_world * piece.pose;
+            let view_from_voxel = view_from_unmoved * world_from_voxel;
+            let mut planes = box_planes(low, high, &view_from_voxel);
+            let mut cylinders = Vec::new();
+            for (cutter, side) in &piece.keep {
+                match cutter {
+                    Cutter::Plane { point, normal } => {
+                        let inward = if *side == Side::Plus { *normal } else { -*normal };
+                        let half = HalfSpace::new(point, inward);
+                        solid = solid.clipped(&half.transformed(&world_from_voxel.inverse()));
+                        planes.push(unit(half.transformed(&view_from_unmoved)));
+                    }
+                    Cutter::Cylinder { point, axis, radius_mm } => {
+                        let axis = view_from_unmoved.vector(axis);
+                        cylinders.push(Tube {
+                            point: view_from_unmoved.point(point),
+                            across: across(&axis),
+                            radius_mm: *radius_mm,
+                            outside: *side == Side::Plus,
+                        });
+                    }
+                }
+            }
+            let outside = cylinders.iter().filter(|c| c.outside).count();
+            if outside > MAX_GAPS {
+                return Err(GpuError::Cylinders { count: outside, limit: MAX_GAPS });
+            }
+            let (Some(bounds), Some(proxy)) =
+                (solid.bounds(), Proxy::new(&solid.transformed(&view_from_voxel)))
+            else {
+                self.counts.fragments_empty += 1;
+                continue;
+            };
+            self.counts.fragments += 1;
+            let plan = Plan::new(
+                &item.grid,
+                &item.transfer,
+                item.texture,
+                bounds,
+                gpu.caps(),
+                &mut self.notes,
+            );
+            let texture = textures.get(gpu, &plan)?;
+            let kind = match (is_colour(texture.key.format), item.shading) {
+                (true, Shading::None) => Kind::Color,
+                (true, Shading::Lit) => {
+                    let note = "a pre-classified texture has no gradient: its volume is drawn unlit";
+                    self.notes.push(note.to_owned());
+                    Kind::Color
+                }
+                (false, Shading::None) => Kind::Scalar,
+                (false, Shading::Lit) => Kind::ScalarLit,
+            };
+            let position = self.textures.iter().position(|t| Arc::ptr_eq(t, &texture));
+            let position = position.unwrap_or_else(|| {
+                self.textures.push(Arc::clone(&texture));
+                self.textures.len() - 1
+            });
+            let index = self.fragments.len() as u32;
+            self.members.push(Member { proxy, volume: Some((index, kind, position)) });
+            let transfer = Arc::clone(&item.transfer);
+            self.fragments.push(Fragment { texture, view_from_voxel, planes, cylinders, transfer, table });
+        }
+        Ok(())
+    }
+
+    fn table(&mut self, transfer: &Arc<Transfer>) -> usize {
+        if let Some(found) = self.known_tables.iter().position(|(t, _)| Arc::ptr_eq(t, transfer)) {
+            return found;
+        }
+        let table = Table::new(transfer);
+        self.tables.extend_from_slice(&table.texels);
+        self.known_tables.push((Arc::clone(transfer), table));
+        self.known_tables.len() - 1
+    }
+
+    /// The fragments, planes and cylinders as the shader reads them, seen from the stack's near plane.
+    pub(crate) fn to_gpu(
+        &self,
+        view: &View,
+        spacing: &Spacing,
+    ) -> (Vec<gpu_data::Fragment>, Vec<Form>, Vec<gpu_data::Cylinder>) {
+        let near = spacing.near_mm;
+        let (mut fragments, mut planes, mut cylinders) = (Vec::new(), Vec::new(), Vec::new());
+        for fragment in &self.fragments {
+            let texture_from_view =
+                fragment.texture.texture_from_voxel * fragment.view_from_voxel.inverse();
+            let row = |r| view.row_form(&texture_from_view, r, near);
+            let (plane_first, cylinder_first) = (planes.len() as u32, cylinders.len() as u32);
+            planes.extend(fragment.planes.iter().map(|p| view.form(p, near)));
+            cylinders.extend(fragment.cylinders.iter().map(|tube| {
+                let form = |normal: Vector| view.form(&HalfSpace::new(&tube.point, normal), near);
+                gpu_data::Cylinder {
+                    u: form(tube.across[0]),
+                    v: form(tube.across[1]),
+                    radius_mm: tube.radius_mm as f32,
+                    outside: u32::from(tube.outside),
+                    pad_0: 0,
+                    pad_1: 0,
+                }
+            }));
+            let (_, table) = &self.known_tables[fragment.table];
+            let texture = &fragment.texture;
+            let points = fragment.transfer.points();
+            let span = points[points.len() - 1].value - points[0].value;
+            let span = if span > 0.0 { span } else { 1.0 };
+            let gradient = |axis: usize| {
+                let mut along = Vector::zeros();
+                along[axis] = 1.0;
+                let g = fragment.view_from_voxel.normal(&along) * (texture.value_scale / (2.0 * span));
+                let step = texture.texture_from_voxel.matrix()[(axis, axis)];
+                [g.x as f32, g.y as f32, g.z as f32, step as f32]
+            };
+            fragments.push(gpu_data::Fragment {
+                u: row(0),
+                v: row(1),
+                w: row(2),
+                gradient_x: gradient(0),
+                gradient_y: gradient(1),
+                gradient_z: gradient(2),
+                table_scale: (texture.value_scale / table.step) as f32,
+                table_offset: ((texture.value_offset - table.first) / table.step) as f32,
+                table_row: (fragment.table * ROWS) as u32,
+                unit_mm: fragment.transfer.unit_mm() as f32,
+                plane_first,
+                plane_end: planes.len() as u32,
+                cylinder_first,
+                cylinder_end: cylinders.len() as u32,
+            });
+        }
+        debug_assert_eq!(self.tables.len(), self.known_tables.len() * ROWS * NODES, "whole tables");
+        (fragments, planes, cylinders)
+    }
+}
+
+/// The six faces of a voxel box, inwards, in view space.
+fn box_planes(low: Point, high: Point, view_from_voxel: &Affine) -> Vec<HalfSpace> {
+    let mut planes = Vec::with_capacity(12);
+    for axis in 0..3 {
+        let mut inward = Vector::zeros();
+        inward[axis] = 1.0;
+        planes.push(unit(HalfSpace::new(&low, inward).transformed(view_from_voxel)));
+        planes.push(unit(HalfSpace::new(&high, -inward).transformed(view_from_voxel)));
+    }
+    planes
+}
+
+/// The same half-space with a normal of length 1, so that its value is in mm.
+fn unit(half: HalfSpace) -> HalfSpace {
+    let length = half.normal.norm();
+    if length > 0.0 {
+        HalfSpace { normal: half.normal / length, offset: half.offset / length }
+    } else {
+        half
+    }
+}
+
+/// Two directions at right angles to `axis` and to each other, of length 1.
+fn across(axis: &Vector) -> [Vector; 2] {
+    let axis = axis.try_normalize(0.0).unwrap_or_else(Vector::z);
+    let mut other = Vector::zeros();
+    other[axis.iamin()] = 1.0;
+    let u = axis.cross(&other).try_normalize(0.0).unwrap_or_else(Vector::x);
+    [u, axis.cross(&u)]
+}

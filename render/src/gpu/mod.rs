@@ -1,0 +1,145 @@
+//! The graphics device: opened headless or taken from a window, with what it can do.
+
+mod error;
+mod readback;
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+pub use error::GpuError;
+pub(crate) use readback::{read_buffer, read_texture};
+
+/// Features used where an adapter has them; each has a fall-back where it has not.
+const WANTED: wgpu::Features = wgpu::Features::TEXTURE_COMPRESSION_BC
+    .union(wgpu::Features::TEXTURE_COMPRESSION_BC_SLICED_3D)
+    .union(wgpu::Features::TEXTURE_FORMAT_16BIT_NORM)
+    .union(wgpu::Features::FLOAT32_FILTERABLE)
+    .union(wgpu::Features::FLOAT32_BLENDABLE);
+
+/// The features of `adapter` that this crate uses; ask for them when opening a device for it.
+pub fn wanted_features(adapter: &wgpu::Adapter) -> wgpu::Features {
+    adapter.features() & WANTED
+}
+
+/// The limits to ask of `adapter`: its own, since volumes need its largest textures and buffers.
+pub fn wanted_limits(adapter: &wgpu::Adapter) -> wgpu::Limits {
+    adapter.limits()
+}
+
+/// What a device can do, of what matters here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Caps {
+    /// BC blocks in 3D textures.
+    pub bc_3d: bool,
+    /// 16-bit normalised textures.
+    pub norm16: bool,
+    /// Linear filtering of 32-bit floats.
+    pub float_filter: bool,
+    /// Blending into 32-bit floats.
+    pub float_blend: bool,
+    /// Longest side of a 3D texture, texels.
+    pub texture_3d: u32,
+    /// Longest side of a 2D texture, texels.
+    pub texture_2d: u32,
+    /// Largest storage buffer that a shader may see, bytes.
+    pub storage_bytes: u64,
+}
+
+/// A graphics device and its queue.
+#[derive(Debug)]
+pub struct Gpu {
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    adapter: String,
+    caps: Caps,
+    /// The last fault that no call returned: set by the device's callbacks.
+    fault: Arc<Mutex<Option<GpuError>>>,
+}
+
+impl Gpu {
+    /// Opens the best adapter there is, without a window. A software adapter is taken where no other is.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] and [`GpuError::NoDevice`].
+    pub fn headless() -> Result<Self, GpuError> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
+        let instance = wgpu::Instance::new(descriptor);
+        let options = wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            ..Default::default()
+        };
+        let adapter = pollster::block_on(instance.request_adapter(&options))
+            .map_err(|e| GpuError::NoAdapter { reason: e.to_string() })?;
+        let request = wgpu::DeviceDescriptor {
+            label: Some("headless.device"),
+            required_features: wanted_features(&adapter),
+            required_limits: wanted_limits(&adapter),
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&request)).map_err(|e| {
+            GpuError::NoDevice { adapter: adapter.get_info().name, reason: e.to_string() }
+        })?;
+        Ok(Self::from_wgpu(&adapter, device, queue))
+    }
+
+    /// Takes over a window's device. What the device was opened without is not used.
+    pub fn from_wgpu(adapter: &wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let (features, limits, info) = (device.features(), device.limits(), adapter.get_info());
+        let has = |feature| features.contains(feature);
+        let caps = Caps {
+            bc_3d: has(wgpu::Features::TEXTURE_COMPRESSION_BC_SLICED_3D),
+            norm16: has(wgpu::Features::TEXTURE_FORMAT_16BIT_NORM),
+            float_filter: has(wgpu::Features::FLOAT32_FILTERABLE),
+            float_blend: has(wgpu::Features::FLOAT32_BLENDABLE),
+            texture_3d: limits.max_texture_dimension_3d,
+            texture_2d: limits.max_texture_dimension_2d,
+            storage_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
+        };
+        let fault = Arc::new(Mutex::new(None));
+        let seen = Arc::clone(&fault);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            let error = match error {
+                wgpu::Error::OutOfMemory { .. } => GpuError::OutOfMemory { what: "a picture" },
+                other => GpuError::Refused { reason: other.to_string() },
+            };
+            // The first fault is the cause; those after it are its echo.
+            seen.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+        }));
+        let seen = Arc::clone(&fault);
+        device.set_device_lost_callback(move |_, reason| {
+            let lost = GpuError::Lost { reason };
+            seen.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(lost);
+        });
+        let adapter = format!("{} ({:?})", info.name, info.backend);
+        Self { device, queue, adapter, caps, fault }
+    }
+
+    /// Name and interface of the adapter: `"llvmpipe (LLVM 15.0.6, 256 bits) (Vulkan)"`.
+    pub fn adapter(&self) -> &str {
+        &self.adapter
+    }
+
+    /// What the device can do.
+    pub fn caps(&self) -> Caps {
+        self.caps
+    }
+
+    /// Takes the fault that the device reported since the last call, if any.
+    ///
+    /// # Errors
+    /// That fault.
+    pub(crate) fn check(&self) -> Result<(), GpuError> {
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+    }
+
+    /// Waits until all that was submitted is done.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`], or what the device reported meanwhile.
+    pub(crate) fn wait(&self) -> Result<(), GpuError> {
+        let done = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: None });
+        self.check()?;
+        done.map_err(|e| GpuError::Lost { reason: e.to_string() })?;
+        Ok(())
+    }
+}

@@ -1,0 +1,460 @@
+// Proxy slices as slabs: each polygon covers what a slab of the common stack holds of one or more
+// fragments, and the pixel integrates its own piece of the ray through them.
+//
+// A slab is cut into sub-steps. In each, a fragment contributes exactly the part of the sub-step that its
+// planes and cylinders leave it; the scalar is taken as linear along that part, and extinction and
+// extinction x colour are integrated exactly from their antiderivatives (pre-integration with a table of
+// one dimension; Engel 2001, Lum 2004; Weiler 2003 for the antiderivative). Overlapping fragments add up
+// before the exponential. Surfaces split the sub-step at their own depth.
+//
+// Loops run the same number of rounds in every pixel and skip what is over: Mesa 22.3's llvmpipe computes
+// wrong values where the lanes of a loop leave it at different rounds.
+
+#import "shared/frame.wgsl"
+#import "shared/layers.wgsl"
+#import "shared/light.wgsl"
+
+struct Fragment {
+    // Texture coordinates, 0 to 1 over texel edges.
+    u: Form,
+    v: Form,
+    w: Form,
+    // Gradient along each texture axis' voxel step to view space, in value spans per mm; w: step in
+    // texture coordinates.
+    gradient_x: vec4<f32>,
+    gradient_y: vec4<f32>,
+    gradient_z: vec4<f32>,
+    // Table position of a texel value t: t * table_scale + table_offset.
+    table_scale: f32,
+    table_offset: f32,
+    // First of the three rows of the fragment's table.
+    table_row: u32,
+    // Length that a pre-classified opacity is of, mm.
+    unit_mm: f32,
+    plane_first: u32,
+    plane_end: u32,
+    cylinder_first: u32,
+    cylinder_end: u32,
+}
+
+struct Cylinder {
+    // Two directions across the axis, mm from it.
+    u: Form,
+    v: Form,
+    radius_mm: f32,
+    // 1: the outside is kept; 0: the inside.
+    outside: u32,
+    pad_0: u32,
+    pad_1: u32,
+}
+
+const SLOTS: u32 = 8u;
+
+const SKIP_LAYERS: u32 = 0x80000000u;
+
+struct Component {
+    fragments: array<u32, 8>,
+}
+
+@group(1) @binding(0) var volume_0: texture_3d<f32>;
+@group(1) @binding(1) var volume_1: texture_3d<f32>;
+@group(1) @binding(2) var volume_2: texture_3d<f32>;
+@group(1) @binding(3) var volume_3: texture_3d<f32>;
+@group(1) @binding(4) var volume_4: texture_3d<f32>;
+@group(1) @binding(5) var volume_5: texture_3d<f32>;
+@group(1) @binding(6) var volume_6: texture_3d<f32>;
+@group(1) @binding(7) var volume_7: texture_3d<f32>;
+@group(1) @binding(8) var linear: sampler;
+
+@group(2) @binding(0) var<storage, read> fragments: array<Fragment>;
+@group(2) @binding(1) var<storage, read> planes: array<Form>;
+@group(2) @binding(2) var<storage, read> cylinders: array<Cylinder>;
+@group(2) @binding(3) var<storage, read> components: array<Component>;
+@group(2) @binding(4) var transfer_table: texture_2d<f32>;
+
+@group(3) @binding(0) var<storage, read> heads: array<u32>;
+@group(3) @binding(1) var<storage, read> layers: array<Layer>;
+@group(3) @binding(2) var opaque_color: texture_2d<f32>;
+@group(3) @binding(3) var opaque_zeta: texture_2d<f32>;
+
+// What is in each slot: one of the kinds below. Fixed when the pipeline is made, so that empty slots and
+// unused branches cost nothing.
+override KIND_0: u32 = 0u;
+override KIND_1: u32 = 0u;
+override KIND_2: u32 = 0u;
+override KIND_3: u32 = 0u;
+override KIND_4: u32 = 0u;
+override KIND_5: u32 = 0u;
+override KIND_6: u32 = 0u;
+override KIND_7: u32 = 0u;
+// Whether any fragment keeps the outside of a cylinder.
+override GAPS: bool = false;
+// Whether surfaces may lie in the slab, and whether any of the picture's is translucent.
+override SURFACES: bool = false;
+override LAYERS: bool = false;
+
+const KIND_NONE: u32 = 0u;
+const KIND_SCALAR: u32 = 1u;
+const KIND_SCALAR_LIT: u32 = 2u;
+const KIND_COLOR: u32 = 3u;
+
+struct VertexOut {
+    @builtin(position) position: vec4<f32>,
+    @location(0) @interpolate(flat) slab: u32,
+    @location(1) @interpolate(flat) component: u32,
+}
+
+@vertex
+fn vs_main(
+    @location(0) ndc: vec2<f32>,
+    @location(1) slab: u32,
+    @location(2) component: u32,
+) -> VertexOut {
+    let zeta = f32(slab * frame.steps) * frame.step_mm;
+    return VertexOut(vec4<f32>(ndc, depth_of(zeta), 1.0), slab, component);
+}
+
+// A fragment on one ray within one slab.
+struct Slot {
+    // The kept part of the slab, zeta; start <= end.
+    start: f32,
+    end: f32,
+    // Texture coordinates at the near plane and per mm of zeta.
+    origin: vec3<f32>,
+    direction: vec3<f32>,
+    // The last sampled place, and what was there: table position and antiderivative, or colour.
+    zeta: f32,
+    position: f32,
+    high: vec4<f32>,
+    low: vec4<f32>,
+    gap_count: u32,
+    gaps: array<vec2<f32>, 8>,
+}
+
+fn along(form: Form, e: vec3<f32>) -> vec2<f32> {
+    return vec2<f32>(dot(form.at_near.xyz, e), dot(form.per_mm.xyz, e));
+}
+
+// The part of [z0, z1] that a fragment's planes and inner cylinders keep, and the gaps of the others.
+fn open_slot(id: u32, e: vec3<f32>, z0: f32, z1: f32) -> Slot {
+    var slot: Slot;
+    slot.start = z0;
+    slot.end = z1;
+    for (var i = fragments[id].plane_first; i < fragments[id].plane_end; i++) {
+        let line = along(planes[i], e);
+        let crossing = -line.x / line.y;
+        if line.y > 0.0 {
+            slot.start = max(slot.start, crossing);
+        } else if line.y < 0.0 {
+            slot.end = min(slot.end, crossing);
+        } else if line.x < 0.0 {
+            slot.end = slot.start;
+        }
+    }
+    for (var i = fragments[id].cylinder_first; i < fragments[id].cylinder_end; i++) {
+        let u = along(cylinders[i].u, e);
+        let v = along(cylinders[i].v, e);
+        let radius = cylinders[i].radius_mm;
+        let a = u.y * u.y + v.y * v.y;
+        let b = u.x * u.y + v.x * v.y;
+        let across = u.x * v.y - u.y * v.x;
+        let discriminant = radius * radius * a - across * across;
+        var inside = vec2<f32>(1.0, 0.0);
+        if a > 1e-12 {
+            if discriminant > 0.0 {
+                let root = sqrt(discriminant);
+                inside = vec2<f32>(-b - root, -b + root) / a;
+            }
+        } else if u.x * u.x + v.x * v.x < radius * radius {
+            inside = vec2<f32>(z0, z1);
+        }
+        if cylinders[i].outside == 0u {
+            slot.start = max(slot.start, inside.x);
+            slot.end = min(slot.end, inside.y);
+            if inside.y < inside.x {
+                slot.end = slot.start;
+            }
+        } else if GAPS && inside.x < inside.y && inside.y > z0 && inside.x < z1 {
+            slot.gaps[slot.gap_count] = inside;
+            slot.gap_count++;
+        }
+    }
+    slot.start = min(slot.start, z1);
+    slot.end = max(slot.start, slot.end);
+    let u = along(fragments[id].u, e);
+    let v = along(fragments[id].v, e);
+    let w = along(fragments[id].w, e);
+    slot.origin = vec3<f32>(u.x, v.x, w.x);
+    slot.direction = vec3<f32>(u.y, v.y, w.y);
+    slot.zeta = slot.start;
+    return slot;
+}
+
+// Extinction x colour and extinction (1/mm) at a table position, held constant outside the table.
+fn classify(x: f32, row: u32) -> vec4<f32> {
+    let last = i32(textureDimensions(transfer_table).x) - 1;
+    let j = clamp(i32(floor(x)), 0, last - 1);
+    let part = clamp(x - f32(j), 0.0, 1.0);
+    let a = textureLoad(transfer_table, vec2<i32>(j, i32(row)), 0);
+    let b = textureLoad(transfer_table, vec2<i32>(j + 1, i32(row)), 0);
+    return a + (b - a) * part;
+}
+
+// The antiderivative of `classify` as a sum of two parts, so that differences keep their digits.
+fn antiderivative(x: f32, row: u32, high: ptr<function, vec4<f32>>, low: ptr<function, vec4<f32>>) {
+    let last = i32(textureDimensions(transfer_table).x) - 1;
+    let j = clamp(i32(floor(x)), 0, last - 1);
+    let part = x - f32(j);
+    let inner = clamp(part, 0.0, 1.0);
+    let a = textureLoad(transfer_table, vec2<i32>(j, i32(row)), 0);
+    let b = textureLoad(transfer_table, vec2<i32>(j + 1, i32(row)), 0);
+    *high = textureLoad(transfer_table, vec2<i32>(j, i32(row) + 1), 0);
+    let beyond = (part - inner) * select(b, a, part < 0.0);
+    *low = textureLoad(transfer_table, vec2<i32>(j, i32(row) + 2), 0)
+        + inner * a + 0.5 * inner * inner * (b - a) + beyond;
+}
+
+fn place(slot: ptr<function, Slot>, zeta: f32) -> vec3<f32> {
+    return (*slot).origin + (*slot).direction * zeta;
+}
+
+// Extinction x colour, extinction, of a pre-classified texel.
+fn extinction_of(texel: vec4<f32>, unit_mm: f32) -> vec4<f32> {
+    let tau = -log(1.0 - min(texel.a, 0.999999)) / unit_mm;
+    return vec4<f32>(texel.rgb * tau, tau);
+}
+
+// Takes the sample at the slot's start.
+fn begin(kind: u32, slot: ptr<function, Slot>, id: u32, volume: texture_3d<f32>) {
+    let texel = textureSampleLevel(volume, linear, place(slot, (*slot).zeta), 0.0);
+    if kind == KIND_COLOR {
+        (*slot).high = extinction_of(texel, fragments[id].unit_mm);
+    } else {
+        (*slot).position = texel.r * fragments[id].table_scale + fragments[id].table_offset;
+        var high: vec4<f32>;
+        var low: vec4<f32>;
+        antiderivative((*slot).position, fragments[id].table_row, &high, &low);
+        (*slot).high = high;
+        (*slot).low = low;
+    }
+}
+
+// The length of [a, b] that the slot's gaps leave.
+fn kept_length(slot: ptr<function, Slot>, a: f32, b: f32) -> f32 {
+    var start = a;
+    var end = b;
+    var inner = 0.0;
+    for (var i = 0u; i < (*slot).gap_count; i++) {
+        let gap = (*slot).gaps[i];
+        if gap.x <= start && gap.y >= end {
+            end = start;
+        } else if gap.x <= start && gap.y > start {
+            start = gap.y;
+        } else if gap.y >= end && gap.x < end {
+            end = gap.x;
+        } else if gap.x > start && gap.y < end {
+            inner += gap.y - gap.x;
+        }
+    }
+    return max(0.0, end - start - inner);
+}
+
+// |n·v| of the gradient at a place, or -1 where the field is flat.
+fn facing(id: u32, volume: texture_3d<f32>, at: vec3<f32>, ray: vec3<f32>) -> f32 {
+    let x = vec3<f32>(fragments[id].gradient_x.w, 0.0, 0.0);
+    let y = vec3<f32>(0.0, fragments[id].gradient_y.w, 0.0);
+    let z = vec3<f32>(0.0, 0.0, fragments[id].gradient_z.w);
+    let dx = textureSampleLevel(volume, linear, at + x, 0.0).r - textureSampleLevel(volume, linear, at - x, 0.0).r;
+    let dy = textureSampleLevel(volume, linear, at + y, 0.0).r - textureSampleLevel(volume, linear, at - y, 0.0).r;
+    let dz = textureSampleLevel(volume, linear, at + z, 0.0).r - textureSampleLevel(volume, linear, at - z, 0.0).r;
+    let gradient = dx * fragments[id].gradient_x.xyz
+        + dy * fragments[id].gradient_y.xyz
+        + dz * fragments[id].gradient_z.xyz;
+    let size = length(gradient);
+    if size < FLAT {
+        return -1.0;
+    }
+    return abs(dot(gradient / size, ray));
+}
+
+// Optical depth x colour and optical depth of the slot from its last place to `zeta`.
+fn advance(
+    kind: u32,
+    slot: ptr<function, Slot>,
+    id: u32,
+    volume: texture_3d<f32>,
+    zeta: f32,
+    ray: vec4<f32>,
+) -> vec4<f32> {
+    let b = clamp(zeta, (*slot).start, (*slot).end);
+    let a = (*slot).zeta;
+    (*slot).zeta = b;
+    var span = b - a;
+    if GAPS {
+        span = kept_length(slot, a, b);
+    }
+    let texel = textureSampleLevel(volume, linear, place(slot, b), 0.0);
+    var mean: vec4<f32>;
+    if kind == KIND_COLOR {
+        let here = extinction_of(texel, fragments[id].unit_mm);
+        mean = 0.5 * ((*slot).high + here);
+        (*slot).high = here;
+    } else {
+        let row = fragments[id].table_row;
+        let before = (*slot).position;
+        let here = texel.r * fragments[id].table_scale + fragments[id].table_offset;
+        var high: vec4<f32>;
+        var low: vec4<f32>;
+        antiderivative(here, row, &high, &low);
+        let last = f32(textureDimensions(transfer_table).x) - 1.0;
+        let beyond = min(before, here) >= last || max(before, here) <= 0.0;
+        if abs(here - before) > 1.0 && !beyond {
+            mean = ((high - (*slot).high) + (low - (*slot).low)) / (here - before);
+        } else {
+            mean = classify(0.5 * (before + here), row);
+        }
+        (*slot).position = here;
+        (*slot).high = high;
+        (*slot).low = low;
+        if kind == KIND_SCALAR_LIT && mean.a > 0.0 {
+            let toward = facing(id, volume, place(slot, 0.5 * (a + b)), ray.xyz);
+            if toward >= 0.0 {
+                mean = vec4<f32>(lit(mean.rgb / mean.a, toward) * mean.a, mean.a);
+            }
+        }
+    }
+    return max(mean, vec4<f32>(0.0)) * (span * ray.w);
+}
+
+// The nearest layer of a pixel at or behind `zeta`.
+fn first_layer(pixel: vec2<u32>, zeta: f32) -> u32 {
+    var best = NO_LAYER;
+    var node = heads[2u * list_index(pixel)];
+    for (var i = 0u; i < frame.layer_most; i++) {
+        if node == NO_LAYER {
+            continue;
+        }
+        let here = layers[node];
+        if here.zeta >= zeta && (best == NO_LAYER || precedes(here, node, layers[best], best)) {
+            best = node;
+        }
+        node = here.next;
+    }
+    return best;
+}
+
+// The layer that follows `last` in the order of compositing. Lists are short and unsorted.
+fn layer_after(pixel: vec2<u32>, last: u32) -> u32 {
+    let before = layers[last];
+    var best = NO_LAYER;
+    var node = heads[2u * list_index(pixel)];
+    for (var i = 0u; i < frame.layer_most; i++) {
+        if node == NO_LAYER {
+            continue;
+        }
+        let here = layers[node];
+        if precedes(before, last, here, node) && (best == NO_LAYER || precedes(here, node, layers[best], best)) {
+            best = node;
+        }
+        node = here.next;
+    }
+    return best;
+}
+
+// (1 - exp(-t)) / t, without loss for small t.
+fn absorbed_per_depth(t: f32) -> f32 {
+    if t < 0.05 {
+        return 1.0 - t * (0.5 - t * (1.0 / 6.0 - t * (1.0 / 24.0 - t / 120.0)));
+    }
+    return (1.0 - exp(-t)) / t;
+}
+
+@fragment
+fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
+    let pixel = vec2<u32>(in.position.xy);
+    let ndc = ndc_of(pixel);
+    let e = vec3<f32>(1.0, ndc);
+    let ray = vec4<f32>(ray_direction(ndc), mm_per_zeta(ndc));
+    let component = in.component & ~SKIP_LAYERS;
+    let first = in.slab * frame.steps;
+    let z0 = f32(first) * frame.step_mm;
+    let z1 = f32(first + frame.steps) * frame.step_mm;
+
+    var s0: Slot; var s1: Slot; var s2: Slot; var s3: Slot;
+    var s4: Slot; var s5: Slot; var s6: Slot; var s7: Slot;
+    let ids = components[component].fragments;
+    if KIND_0 != KIND_NONE { s0 = open_slot(ids[0], e, z0, z1); begin(KIND_0, &s0, ids[0], volume_0); }
+    if KIND_1 != KIND_NONE { s1 = open_slot(ids[1], e, z0, z1); begin(KIND_1, &s1, ids[1], volume_1); }
+    if KIND_2 != KIND_NONE { s2 = open_slot(ids[2], e, z0, z1); begin(KIND_2, &s2, ids[2], volume_2); }
+    if KIND_3 != KIND_NONE { s3 = open_slot(ids[3], e, z0, z1); begin(KIND_3, &s3, ids[3], volume_3); }
+    if KIND_4 != KIND_NONE { s4 = open_slot(ids[4], e, z0, z1); begin(KIND_4, &s4, ids[4], volume_4); }
+    if KIND_5 != KIND_NONE { s5 = open_slot(ids[5], e, z0, z1); begin(KIND_5, &s5, ids[5], volume_5); }
+    if KIND_6 != KIND_NONE { s6 = open_slot(ids[6], e, z0, z1); begin(KIND_6, &s6, ids[6], volume_6); }
+    if KIND_7 != KIND_NONE { s7 = open_slot(ids[7], e, z0, z1); begin(KIND_7, &s7, ids[7], volume_7); }
+
+    // The next surface: a translucent layer or the opaque one, whichever is nearer.
+    var layer = NO_LAYER;
+    var wall = 3.4e38;
+    if SURFACES {
+        wall = textureLoad(opaque_zeta, pixel, 0).r;
+        if LAYERS && (in.component & SKIP_LAYERS) == 0u {
+            layer = first_layer(pixel, z0);
+        }
+    }
+
+    var color = vec3<f32>(0.0);
+    var alpha = 0.0;
+    var k = 0u;
+    // Each round takes a sub-step or a layer.
+    var rounds = frame.steps;
+    if LAYERS {
+        rounds += frame.layer_most;
+    }
+    for (var round = 0u; round < rounds; round++) {
+        if k >= frame.steps {
+            continue;
+        }
+        let grid = f32(first + k + 1u) * frame.step_mm;
+        var end = grid;
+        var stop = wall;
+        if SURFACES {
+            if layer != NO_LAYER {
+                stop = min(stop, layers[layer].zeta);
+            }
+            end = min(end, stop);
+        }
+
+        var sum = vec4<f32>(0.0);
+        if KIND_0 != KIND_NONE { sum += advance(KIND_0, &s0, ids[0], volume_0, end, ray); }
+        if KIND_1 != KIND_NONE { sum += advance(KIND_1, &s1, ids[1], volume_1, end, ray); }
+        if KIND_2 != KIND_NONE { sum += advance(KIND_2, &s2, ids[2], volume_2, end, ray); }
+        if KIND_3 != KIND_NONE { sum += advance(KIND_3, &s3, ids[3], volume_3, end, ray); }
+        if KIND_4 != KIND_NONE { sum += advance(KIND_4, &s4, ids[4], volume_4, end, ray); }
+        if KIND_5 != KIND_NONE { sum += advance(KIND_5, &s5, ids[5], volume_5, end, ray); }
+        if KIND_6 != KIND_NONE { sum += advance(KIND_6, &s6, ids[6], volume_6, end, ray); }
+        if KIND_7 != KIND_NONE { sum += advance(KIND_7, &s7, ids[7], volume_7, end, ray); }
+        let part = absorbed_per_depth(sum.a);
+        color += (1.0 - alpha) * part * sum.rgb;
+        alpha += (1.0 - alpha) * part * sum.a;
+
+        var next = k + 1u;
+        if SURFACES {
+            let at_wall = wall < grid;
+            let at_layer = layer != NO_LAYER && stop < grid && stop < wall;
+            if at_layer {
+                let surface = layers[layer].color;
+                color += (1.0 - alpha) * surface.a * surface.rgb;
+                alpha += (1.0 - alpha) * surface.a;
+                layer = layer_after(pixel, layer);
+                next = k;
+            } else if at_wall {
+                let seen = select(0.0, 1.0 - alpha, wall >= z0 && (in.component & SKIP_LAYERS) == 0u);
+                color += seen * textureLoad(opaque_color, pixel, 0).rgb;
+                alpha += seen;
+                next = frame.steps;
+            }
+        }
+        k = next;
+    }
+    return vec4<f32>(color, alpha);
+}

@@ -1,0 +1,199 @@
+//! The common stack of slabs: which members each slab holds, which of them must be integrated together,
+//! and the vertices and draws that follow, front to back.
+
+use super::polygons::{Polygon, Proxy, hull, overlap};
+use super::{Kind, SATURATE_EVERY, SLOTS};
+use crate::view::View;
+
+/// Something that takes part in a slab: a fragment of a volume, or the room of a mesh.
+#[derive(Debug)]
+pub(crate) struct Member {
+    pub(crate) proxy: Proxy,
+    /// Index into the fragment buffer, what its texture is, and its index among the textures; `None` for
+    /// a mesh.
+    pub(crate) volume: Option<(u32, Kind, usize)>,
+}
+
+/// One corner of a proxy polygon.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Vertex {
+    pub(crate) ndc: [f32; 2],
+    pub(crate) slab: u32,
+    pub(crate) component: u32,
+}
+
+/// Set in [`Vertex::component`] where another draw of the slab takes the surfaces.
+pub(crate) const SKIP_LAYERS: u32 = 0x8000_0000;
+
+/// What the slots of a draw hold: kind and texture of each.
+pub(crate) type Slots = [(Kind, usize); SLOTS];
+
+/// Consecutive triangles with the same slots.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Draw {
+    pub(crate) slots: Slots,
+    /// Whether surfaces may lie in it.
+    pub(crate) surfaces: bool,
+    pub(crate) vertices: std::ops::Range<u32>,
+    /// The slabs that it begins and ends with.
+    pub(crate) slabs: [u32; 2],
+}
+
+/// Where the slabs lie.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Spacing {
+    /// Depth of the first slab's front, mm.
+    pub(crate) near_mm: f64,
+    pub(crate) step_mm: f64,
+    /// Sub-steps a slab.
+    pub(crate) steps: u32,
+    pub(crate) slabs: u32,
+}
+
+/// Slabs at most; beyond it each has more sub-steps.
+const MAX_SLABS: f64 = 2048.0;
+
+impl Spacing {
+    /// A stack over all members with sub-steps of `step_mm`; `None` where none is before the eye.
+    pub(crate) fn new(members: &[Member], step_mm: f64, steps: u32) -> Option<Self> {
+        let near = members.iter().map(|m| m.proxy.depth[0]).fold(f64::INFINITY, f64::min).max(0.0);
+        let far = members.iter().map(|m| m.proxy.depth[1]).fold(f64::NEG_INFINITY, f64::max);
+        if far <= near {
+            return None;
+        }
+        // A little room at both ends, so that no surface lies exactly on the stack's own faces.
+        let room = (far - near) * 1e-4 + 1e-4;
+        let near_mm = (near - room).max(0.0);
+        let depth = far + room - near_mm;
+        let needed = (depth / (step_mm * f64::from(steps))).ceil();
+        let steps = if needed > MAX_SLABS { (depth / (step_mm * MAX_SLABS)).ceil() as u32 } else { steps };
+        let slabs = (depth / (step_mm * f64::from(steps))).ceil() as u32;
+        Some(Self { near_mm, step_mm, steps, slabs })
+    }
+
+    pub(crate) fn slab_mm(&self) -> f64 {
+        self.step_mm * f64::from(self.steps)
+    }
+
+    pub(crate) fn depth_mm(&self) -> f64 {
+        self.slab_mm() * f64::from(self.slabs)
+    }
+}
+
+/// Vertices, components and draws of a frame.
+#[derive(Debug, Default)]
+pub(crate) struct Stack {
+    pub(crate) vertices: Vec<Vertex>,
+    /// Fragments of each component, by slot.
+    pub(crate) components: Vec<[u32; SLOTS]>,
+    pub(crate) draws: Vec<Draw>,
+    /// Slabs with something in them.
+    pub(crate) occupied: u32,
+    /// Members of slabs that lie outside the picture.
+    pub(crate) off_screen: u32,
+    /// The most fragments integrated together.
+    pub(crate) most_overlapping: usize,
+}
+
+impl Stack {
+    pub(crate) fn new(members: &[Member], view: &View, spacing: &Spacing) -> Self {
+        let mut stack = Self::default();
+        for slab in 0..spacing.slabs {
+            let near = spacing.near_mm + f64::from(slab) * spacing.slab_mm();
+            let far = near + spacing.slab_mm();
+            let mut present: Vec<(usize, Polygon)> = Vec::new();
+            for (index, member) in members.iter().enumerate() {
+                if member.proxy.depth[1] < near || member.proxy.depth[0] > far {
+                    continue;
+                }
+                let polygon = member.proxy.polygon(view, near, far);
+                if polygon.is_empty() {
+                    stack.off_screen += 1;
+                } else {
+                    present.push((index, polygon));
+                }
+            }
+            stack.occupied += u32::from(!present.is_empty());
+            for group in groups(&present) {
+                stack.add(slab, members, &group);
+            }
+        }
+        stack
+    }
+
+    fn add(&mut self, slab: u32, members: &[Member], group: &[&(usize, Polygon)]) {
+        let polygon = match group {
+            [(_, only)] => only.clone(),
+            many => hull(many.iter().flat_map(|(_, p)| p.iter().copied()).collect()),
+        };
+        let surfaces = group.iter().any(|(m, _)| members[*m].volume.is_none());
+        let mut volumes: Vec<_> = group.iter().filter_map(|(m, _)| members[*m].volume).collect();
+        // By kind, so that fewer different shaders are made.
+        volumes.sort_by_key(|&(fragment, kind, _)| (kind, fragment));
+        self.most_overlapping = self.most_overlapping.max(volumes.len());
+        let mut chunks: Vec<&[(u32, Kind, usize)]> = volumes.chunks(SLOTS).collect();
+        if chunks.is_empty() {
+            chunks.push(&[]);
+        }
+        for (number, chunk) in chunks.into_iter().enumerate() {
+            let mut slots: Slots = [(Kind::None, 0); SLOTS];
+            let mut fragments = [u32::MAX; SLOTS];
+            for (slot, &(fragment, kind, texture)) in chunk.iter().enumerate() {
+                slots[slot] = (kind, texture);
+                fragments[slot] = fragment;
+            }
+            let known = self.components.iter().rposition(|c| *c == fragments);
+            let component = known.unwrap_or_else(|| {
+                self.components.push(fragments);
+                self.components.len() - 1
+            }) as u32;
+            let component = if number > 0 { component | SKIP_LAYERS } else { component };
+            let first = self.vertices.len() as u32;
+            let corner = |p: [f64; 2]| Vertex { ndc: p.map(|c| c as f32), slab, component };
+            for pair in polygon[1..].windows(2) {
+                self.vertices.extend([polygon[0], pair[0], pair[1]].map(corner));
+            }
+            let end = self.vertices.len() as u32;
+            match self.draws.last_mut() {
+                Some(last)
+                    if (last.slots, last.surfaces) == (slots, surfaces)
+                        && slab - last.slabs[0] < SATURATE_EVERY =>
+                {
+                    (last.vertices.end, last.slabs[1]) = (end, slab);
+                }
+                _ => self.draws.push(Draw { slots, surfaces, vertices: first..end, slabs: [slab; 2] }),
+            }
+        }
+    }
+}
+
+/// Members whose polygons touch, directly or through others.
+fn groups(present: &[(usize, Polygon)]) -> Vec<Vec<&(usize, Polygon)>> {
+    let mut groups: Vec<Vec<&(usize, Polygon)>> = Vec::new();
+    for member in present {
+        let (touching, mut apart): (Vec<_>, Vec<_>) =
+            groups.into_iter().partition(|group| group.iter().any(|other| overlap(&other.1, &member.1)));
+        let mut joined: Vec<_> = touching.into_iter().flatten().collect();
+        joined.push(member);
+        apart.push(joined);
+        groups = apart;
+    }
+    groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn members_join_through_a_third() {
+        let square = |x: f64| vec![[x, 0.0], [x + 1.0, 0.0], [x + 1.0, 1.0], [x, 1.0]];
+        let present = [(0, square(0.0)), (1, square(1.5)), (2, square(5.0)), (3, square(0.8))];
+        let mut found: Vec<Vec<usize>> =
+            groups(&present).into_iter().map(|g| g.iter().map(|(m, _)| *m).collect()).collect();
+        found.iter_mut().for_each(|g| g.sort_unstable());
+        found.sort();
+        assert_eq!(found, [vec![0, 1, 3], vec![2]], "3 touches 0 and 1, nobody touches 2");
+    }
+}

@@ -1,0 +1,118 @@
+//! What a texture is to be, decided before a texel is made: format, box and reduction.
+
+use std::sync::Arc;
+
+use crate::gpu::Caps;
+use crate::scene::TextureFormat;
+use crate::volume::{Affine, Grid, Point, Transfer, Vector};
+
+/// What makes two textures the same.
+#[derive(Debug, Clone)]
+pub(crate) struct TextureKey {
+    pub(crate) grid: Arc<Grid>,
+    /// For pre-classified formats only.
+    pub(crate) transfer: Option<Arc<Transfer>>,
+    pub(crate) format: TextureFormat,
+    /// First and last voxel of the box, both within.
+    pub(crate) low: [usize; 3],
+    pub(crate) high: [usize; 3],
+    /// Voxels averaged into a texel along each axis.
+    pub(crate) reduce: [usize; 3],
+}
+
+impl TextureKey {
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let transfer = match (&self.transfer, &other.transfer) {
+            (None, None) => true,
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b) || a == b,
+            _ => false,
+        };
+        transfer
+            && Arc::ptr_eq(&self.grid, &other.grid)
+            && (self.format, self.low, self.high, self.reduce)
+                == (other.format, other.low, other.high, other.reduce)
+    }
+}
+
+/// A texture to be made.
+#[derive(Debug, Clone)]
+pub(crate) struct Plan {
+    pub(crate) key: TextureKey,
+}
+
+impl Plan {
+    /// Plans the texture of the part of a grid that lies within `bounds` (voxel space), with a voxel more
+    /// on every side for gradients. What the device lacks is replaced and noted.
+    pub(crate) fn new(
+        grid: &Arc<Grid>,
+        transfer: &Arc<Transfer>,
+        asked: TextureFormat,
+        bounds: [Point; 2],
+        caps: Caps,
+        notes: &mut Vec<String>,
+    ) -> Self {
+        let extent = grid.extent();
+        let inside = |c: f64, axis: usize| (c.max(0.0) as usize).min(extent[axis] - 1);
+        let low = [0, 1, 2].map(|a| inside(bounds[0][a].floor() - 1.0, a));
+        let high = [0, 1, 2].map(|a| inside(bounds[1][a].ceil() + 1.0, a));
+        let format = available(asked, caps, notes);
+        let reduce = [0, 1, 2].map(|a| (high[a] - low[a] + 1).div_ceil(caps.texture_3d as usize & !3));
+        if reduce != [1; 3] {
+            notes.push(format!(
+                "a volume of {} x {} x {} is drawn at 1/{} of its resolution: this GPU's 3D textures end at {}",
+                extent[0],
+                extent[1],
+                extent[2],
+                reduce.iter().max().unwrap_or(&1),
+                caps.texture_3d
+            ));
+        }
+        let colour = is_colour(format).then(|| Arc::clone(transfer));
+        Self { key: TextureKey { grid: Arc::clone(grid), transfer: colour, format, low, high, reduce } }
+    }
+
+    /// Texels along each axis, before padding to blocks.
+    pub(crate) fn texels(&self) -> [usize; 3] {
+        let key = &self.key;
+        [0, 1, 2].map(|a| (key.high[a] - key.low[a] + 1).div_ceil(key.reduce[a]))
+    }
+
+    /// 0 to 1 over the edges of a texture of `extent` texels.
+    pub(crate) fn texture_from_voxel(&self, extent: [u32; 3]) -> Affine {
+        let scale = |a: usize| 1.0 / (f64::from(extent[a]) * self.key.reduce[a] as f64);
+        let column = |a: usize| {
+            let mut v = Vector::zeros();
+            v[a] = scale(a);
+            v
+        };
+        let origin = Point::from([0, 1, 2].map(|a| (0.5 - self.key.low[a] as f64) * scale(a)));
+        // A diagonal of positive numbers has an inverse.
+        Affine::from_columns(column(0), column(1), column(2), origin).unwrap_or_default()
+    }
+}
+
+/// Whether a format holds colours instead of values.
+pub(crate) fn is_colour(format: TextureFormat) -> bool {
+    matches!(format, TextureFormat::Rgba8 | TextureFormat::Bc3 | TextureFormat::Bc7)
+}
+
+/// The format asked for, or the nearest that the device has, with a note.
+fn available(asked: TextureFormat, caps: Caps, notes: &mut Vec<String>) -> TextureFormat {
+    use TextureFormat as F;
+    let mut replaced = |by: F, why: &str| {
+        notes.push(format!("texture {asked:?} was replaced by {by:?}: {why}"));
+        by
+    };
+    let scalar = if caps.norm16 { F::R16 } else { F::R32f };
+    match asked {
+        F::Bc3 if !caps.bc_3d => replaced(F::Rgba8, "this GPU has no block compression in 3D textures"),
+        F::Bc4 if !caps.bc_3d => replaced(scalar, "this GPU has no block compression in 3D textures"),
+        F::Bc7 => replaced(F::Rgba8, "there is no BC7 encoder yet"),
+        F::R32f if !caps.float_filter && caps.norm16 => {
+            replaced(F::R16, "this GPU does not filter 32-bit floats")
+        }
+        F::R16 if !caps.norm16 => replaced(F::R32f, "this GPU has no 16-bit textures"),
+        F::Auto => scalar,
+        other => other,
+    }
+}

@@ -1,0 +1,74 @@
+//! Transfer functions as the shaders read them: tables of extinction and of its antiderivative.
+
+use crate::volume::Transfer;
+
+/// Entries of a table.
+pub(crate) const NODES: usize = 4096;
+/// Rows a table takes: extinction, and its antiderivative in two parts.
+pub(crate) const ROWS: usize = 3;
+
+/// One transfer function over evenly spaced values; between two nodes everything is linear.
+///
+/// A texel is (τ·red, τ·green, τ·blue, τ), τ in 1/mm. The antiderivative is over the table position, and
+/// stands as a rounded `f32` and the rest, so that differences of it keep 24 digits more. Error: the true τ
+/// between two nodes departs from the line by at most the function's curvature over 1/4000 of its span.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Table {
+    /// Value of the first node.
+    pub(crate) first: f64,
+    /// Value between two nodes.
+    pub(crate) step: f64,
+    /// [`ROWS`] rows of [`NODES`] texels.
+    pub(crate) texels: Vec<[f32; 4]>,
+}
+
+impl Table {
+    pub(crate) fn new(transfer: &Transfer) -> Self {
+        let points = transfer.points();
+        let (low, high) = (points[0].value, points[points.len() - 1].value);
+        // Some room beyond either end, so that a jump there is inside the table.
+        let room = if high > low { (high - low) * 1e-3 } else { 1.0 };
+        let first = low - room;
+        let step = (high - low + 2.0 * room) / (NODES - 1) as f64;
+        let node = |j: usize| {
+            let (c, tau) = transfer.classify(first + step * j as f64);
+            [c[0] * tau, c[1] * tau, c[2] * tau, tau]
+        };
+        let nodes: Vec<[f64; 4]> = (0..NODES).map(node).collect();
+        let mut texels = vec![[0.0_f32; 4]; ROWS * NODES];
+        let mut sum = [0.0_f64; 4];
+        for (j, value) in nodes.iter().enumerate() {
+            if j > 0 {
+                sum = std::array::from_fn(|c| sum[c] + 0.5 * (nodes[j - 1][c] + value[c]));
+            }
+            let high = sum.map(|s| s as f32);
+            texels[j] = value.map(|v| v as f32);
+            texels[NODES + j] = high;
+            texels[2 * NODES + j] = std::array::from_fn(|c| (sum[c] - f64::from(high[c])) as f32);
+        }
+        Self { first, step, texels }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::ControlPoint;
+
+    #[test]
+    fn the_antiderivative_differs_by_the_integral() {
+        let point = |value, a| ControlPoint { value, rgba: [1.0, 0.25, 0.0, a] };
+        let transfer = Transfer::new(vec![point(-1000.0, 0.9), point(0.0, 0.0), point(3000.0, 0.001)], 1.0)
+            .expect("transfer");
+        let table = Table::new(&transfer);
+        let whole = |j: usize| {
+            f64::from(table.texels[NODES + j][3]) + f64::from(table.texels[2 * NODES + j][3])
+        };
+        // Faint values after a dense stretch: where single precision would have lost them.
+        let (a, b) = (3000, 3005);
+        let mean = (whole(b) - whole(a)) / 5.0;
+        let value = |j: f64| table.first + table.step * j;
+        let truth = transfer.extinction_of(transfer.rgba(value(3002.5))[3]);
+        assert!((mean / truth - 1.0).abs() < 1e-6, "{mean} is not {truth}");
+    }
+}
