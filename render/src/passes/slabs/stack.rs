@@ -115,20 +115,17 @@ impl Stack {
                 }
             }
             stack.occupied += u32::from(!present.is_empty());
-            for group in groups(&present) {
+            for group in groups(present) {
                 stack.add(slab, members, &group);
             }
         }
         stack
     }
 
-    fn add(&mut self, slab: u32, members: &[Member], group: &[&(usize, Polygon)]) {
-        let polygon = match group {
-            [(_, only)] => only.clone(),
-            many => hull(many.iter().flat_map(|(_, p)| p.iter().copied()).collect()),
-        };
-        let surfaces = group.iter().any(|(m, _)| members[*m].volume.is_none());
-        let mut volumes: Vec<_> = group.iter().filter_map(|(m, _)| members[*m].volume).collect();
+    fn add(&mut self, slab: u32, members: &[Member], group: &Group) {
+        let polygon = &group.outline;
+        let surfaces = group.members.iter().any(|&m| members[m].volume.is_none());
+        let mut volumes: Vec<_> = group.members.iter().filter_map(|&m| members[m].volume).collect();
         // By kind, so that fewer different shaders are made.
         volumes.sort_by_key(|&(fragment, kind, _)| (kind, fragment));
         self.most_overlapping = self.most_overlapping.max(volumes.len());
@@ -168,16 +165,25 @@ impl Stack {
     }
 }
 
-/// Members whose polygons touch, directly or through others.
-fn groups(present: &[(usize, Polygon)]) -> Vec<Vec<&(usize, Polygon)>> {
-    let mut groups: Vec<Vec<&(usize, Polygon)>> = Vec::new();
-    for member in present {
-        let (touching, mut apart): (Vec<_>, Vec<_>) =
-            groups.into_iter().partition(|group| group.iter().any(|other| overlap(&other.1, &member.1)));
-        let mut joined: Vec<_> = touching.into_iter().flatten().collect();
-        joined.push(member);
-        apart.push(joined);
-        groups = apart;
+/// Members to be integrated together, and the convex polygon around them.
+struct Group {
+    members: Vec<usize>,
+    outline: Polygon,
+}
+
+/// Members joined until no two outlines touch: then no pixel lies in two groups, and nothing is drawn
+/// twice.
+fn groups(present: Vec<(usize, Polygon)>) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    for (member, polygon) in present {
+        let mut joined = Group { members: vec![member], outline: polygon };
+        while let Some(touching) = groups.iter().position(|g| overlap(&g.outline, &joined.outline)) {
+            let other = groups.swap_remove(touching);
+            joined.members.extend(other.members);
+            joined.outline.extend(other.outline);
+            joined.outline = hull(joined.outline);
+        }
+        groups.push(joined);
     }
     groups
 }
@@ -187,13 +193,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn members_join_through_a_third() {
-        let square = |x: f64| vec![[x, 0.0], [x + 1.0, 0.0], [x + 1.0, 1.0], [x, 1.0]];
-        let present = [(0, square(0.0)), (1, square(1.5)), (2, square(5.0)), (3, square(0.8))];
-        let mut found: Vec<Vec<usize>> =
-            groups(&present).into_iter().map(|g| g.iter().map(|(m, _)| *m).collect()).collect();
+    fn members_join_through_others_and_around_them() {
+        let square = |x: f64, y: f64| vec![[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]];
+        // 0 and 1 meet through 3; 4 touches neither, but lies in the hull of 5 and 6.
+        let present = vec![
+            (0, square(0.0, 0.0)),
+            (1, square(1.5, 0.0)),
+            (2, square(5.0, 0.0)),
+            (3, square(0.8, 0.0)),
+            (4, square(10.0, 2.5)),
+            (5, vec![[10.0, 0.0], [14.0, 0.0], [14.0, 0.5], [10.0, 0.5]]),
+            (6, vec![[13.0, 0.2], [14.0, 0.2], [14.0, 9.0], [13.0, 9.0]]),
+        ];
+        let mut found: Vec<Vec<usize>> = groups(present).into_iter().map(|g| g.members).collect();
         found.iter_mut().for_each(|g| g.sort_unstable());
         found.sort();
-        assert_eq!(found, [vec![0, 1, 3], vec![2]], "3 touches 0 and 1, nobody touches 2");
+        assert_eq!(found, [vec![0, 1, 3], vec![2], vec![4, 5, 6]], "joined groups");
     }
 }

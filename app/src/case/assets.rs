@@ -1,0 +1,249 @@
+//! What the sources of a case name, loaded: grids and surfaces, shared by `Arc`, keyed by source.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use render::volume::{Grid, TriangleMesh};
+use thiserror::Error;
+
+use super::{Case, Implant, Source, Volume};
+use crate::load::{self, Content, Item, Limits, LoadError, Note, Progress};
+use crate::sample;
+
+/// What kind of data is wanted of a source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// A [`Grid`].
+    Volume,
+    /// A [`TriangleMesh`].
+    Surface,
+}
+
+/// Which data.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Key {
+    /// Where they come from.
+    pub source: Source,
+    /// Of which kind.
+    pub kind: Kind,
+    /// Which of that kind, from 0.
+    pub item: usize,
+}
+
+impl Key {
+    /// What a volume needs.
+    pub fn of_volume(volume: &Volume) -> Self {
+        Self { source: volume.source.clone(), kind: Kind::Volume, item: volume.item }
+    }
+
+    /// What an implant needs.
+    pub fn of_implant(implant: &Implant) -> Self {
+        Self { source: implant.source.clone(), kind: Kind::Surface, item: implant.item }
+    }
+}
+
+/// Samples or triangles.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum Data {
+    /// A volume.
+    Grid(Arc<Grid>),
+    /// A surface.
+    Mesh(Arc<TriangleMesh>),
+}
+
+/// Data with what is known about them.
+#[derive(Debug, Clone)]
+pub struct Asset {
+    /// Which these are.
+    pub key: Key,
+    /// What they call themselves.
+    pub name: String,
+    /// The format they were read as.
+    pub format: &'static str,
+    /// `"CT"`, `"MR"`, ... where known.
+    pub modality: Option<String>,
+    /// The data.
+    pub data: Data,
+    /// What departs from the plain reading.
+    pub notes: Vec<Note>,
+}
+
+/// Why a source gave no data.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum AssetError {
+    /// The loader's complaint.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The source has no such item.
+    #[error("holds {found} {kind}, so item {item} is not there; choose another file or item: {}", path.display())]
+    NoItem {
+        /// `volumes` or `surfaces`.
+        kind: &'static str,
+        /// How many there are.
+        found: usize,
+        /// What was asked for.
+        item: usize,
+        /// The source.
+        path: PathBuf,
+    },
+    /// No built-in data of that name.
+    #[error("there are no built-in data \"{name}\"; use builtin:hip/ct, builtin:hip/mri or builtin:hip/stem")]
+    NoBuiltin {
+        /// As asked for.
+        name: String,
+    },
+    /// The built-in sample could not be made.
+    #[error("the built-in sample could not be made: {0}")]
+    Sample(#[from] sample::SampleError),
+}
+
+/// Loaded data of a case.
+#[derive(Debug, Clone, Default)]
+pub struct Assets {
+    loaded: BTreeMap<Key, Arc<Asset>>,
+}
+
+impl Assets {
+    /// The samples of a volume, where loaded.
+    pub fn grid(&self, volume: &Volume) -> Option<&Arc<Grid>> {
+        match &self.loaded.get(&Key::of_volume(volume))?.data {
+            Data::Grid(grid) => Some(grid),
+            Data::Mesh(_) => None,
+        }
+    }
+
+    /// The triangles of an implant, where loaded.
+    pub fn mesh(&self, implant: &Implant) -> Option<&Arc<TriangleMesh>> {
+        match &self.loaded.get(&Key::of_implant(implant))?.data {
+            Data::Mesh(mesh) => Some(mesh),
+            Data::Grid(_) => None,
+        }
+    }
+
+    /// Everything known about some data, where loaded.
+    pub fn asset(&self, key: &Key) -> Option<&Arc<Asset>> {
+        self.loaded.get(key)
+    }
+
+    /// Keeps loaded data.
+    pub fn insert(&mut self, asset: Arc<Asset>) {
+        self.loaded.insert(asset.key.clone(), asset);
+    }
+
+    /// Takes in all that others have loaded.
+    pub fn extend(&mut self, assets: impl IntoIterator<Item = Arc<Asset>>) {
+        for asset in assets {
+            self.insert(asset);
+        }
+    }
+
+    /// What a case needs to be drawn and is not loaded: visible things only, each once.
+    pub fn missing(&self, case: &Case) -> Vec<Key> {
+        let volumes = case.volumes.iter().filter(|v| v.visible).map(Key::of_volume);
+        let implants = case.implants.iter().filter(|i| i.visible).map(Key::of_implant);
+        let mut keys: Vec<Key> = volumes.chain(implants).filter(|k| !self.loaded.contains_key(k)).collect();
+        keys.sort();
+        keys.dedup();
+        keys
+    }
+
+    /// Loads what [`Assets::missing`] names.
+    ///
+    /// # Errors
+    /// [`AssetError`] of the first source that gives nothing; what was loaded before it stays.
+    pub fn load_missing(
+        &mut self,
+        case: &Case,
+        limits: &Limits,
+        progress: &dyn Progress,
+    ) -> Result<(), AssetError> {
+        // A source with several wanted items is opened once.
+        for key in self.missing(case) {
+            if !self.loaded.contains_key(&key) {
+                let wanted: Vec<Key> =
+                    self.missing(case).into_iter().filter(|k| k.source == key.source).collect();
+                let assets = load_keys(&wanted, limits, progress)?;
+                self.extend(assets);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The data of keys that share one source, which is opened once.
+///
+/// # Errors
+/// [`AssetError`] of the first key that gives nothing.
+pub fn load_keys(
+    keys: &[Key],
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<Vec<Arc<Asset>>, AssetError> {
+    let Some(first) = keys.first() else { return Ok(Vec::new()) };
+    let all = open(&first.source, limits, progress)?;
+    let find = |key: &Key| {
+        let found = || all.iter().filter(|a| a.key.kind == key.kind).count();
+        all.iter().find(|a| a.key == *key).cloned().ok_or_else(|| match &key.source {
+            Source::Builtin(name) => AssetError::NoBuiltin { name: name.clone() },
+            Source::Path(path) => AssetError::NoItem {
+                kind: if key.kind == Kind::Volume { "volumes" } else { "surfaces" },
+                found: found(),
+                item: key.item,
+                path: path.clone(),
+            },
+        })
+    };
+    keys.iter().map(find).collect()
+}
+
+/// All volumes and surfaces of a source, numbered by kind. Things of other kinds are left out.
+///
+/// # Errors
+/// [`AssetError`].
+pub fn open(
+    source: &Source,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<Vec<Arc<Asset>>, AssetError> {
+    match source {
+        Source::Path(path) => Ok(number(source, load::open(path, limits, progress)?)),
+        Source::Builtin(name) => {
+            let (data, modality) = match name.as_str() {
+                "hip/ct" => (Data::Grid(sample::ct()?), Some("CT")),
+                "hip/mri" => (Data::Grid(sample::mri()?), Some("MR")),
+                "hip/stem" => (Data::Mesh(sample::stem()?), None),
+                _ => return Err(AssetError::NoBuiltin { name: name.clone() }),
+            };
+            let kind = if matches!(data, Data::Grid(_)) { Kind::Volume } else { Kind::Surface };
+            let key = Key { source: source.clone(), kind, item: 0 };
+            let modality = modality.map(str::to_owned);
+            let name = source.short_name();
+            Ok(vec![Arc::new(Asset { key, name, format: "built-in", modality, data, notes: Vec::new() })])
+        }
+    }
+}
+
+fn number(source: &Source, items: Vec<Item>) -> Vec<Arc<Asset>> {
+    let (mut volumes, mut surfaces) = (0, 0);
+    let mut assets = Vec::new();
+    for item in items {
+        let (data, kind, count) = match item.content {
+            Content::Volume(grid) => (Data::Grid(Arc::new(grid)), Kind::Volume, &mut volumes),
+            // A case shows one moment; a series counts as the volume of its first step.
+            Content::Series(series) => {
+                let Some(first) = series.steps().first() else { continue };
+                (Data::Grid(Arc::clone(first)), Kind::Volume, &mut volumes)
+            }
+            Content::Mesh(mesh) => (Data::Mesh(Arc::new(mesh)), Kind::Surface, &mut surfaces),
+            Content::Cells(_) => continue,
+        };
+        let key = Key { source: source.clone(), kind, item: *count };
+        *count += 1;
+        let Item { name, format, modality, notes, .. } = item;
+        assets.push(Arc::new(Asset { key, name, format, modality, data, notes }));
+    }
+    assets
+}

@@ -1,0 +1,204 @@
+//! Every change: what it does, and what it refuses.
+
+use super::*;
+use crate::case::Source;
+use render::volume::{ControlPoint, Vector};
+
+fn volume(id: &str) -> Box<Volume> {
+    let point = ControlPoint { value: 0.0, rgba: [0.0; 4] };
+    let transfer = Arc::new(Transfer::new(vec![point], 1.0).expect("transfer"));
+    Box::new(Volume::new(id, Source::Builtin("hip/ct".to_owned()), transfer))
+}
+
+fn plane(id: &str, x: f64, normal: [f64; 3]) -> NamedCutter {
+    NamedCutter::new(id, Cutter::plane(Point::new(x, 0.0, 0.0), Vector::from(normal)).expect("plane"))
+}
+
+/// A volume and three planes, x = 0, y = 0 and x = 99.
+fn planned() -> Case {
+    let mut case = Case::default();
+    for edit in [
+        Edit::AddVolume(volume("ct")),
+        Edit::AddCutter(plane("x", 0.0, [1.0, 0.0, 0.0])),
+        Edit::AddCutter(plane("y", 0.0, [0.0, 1.0, 0.0])),
+        Edit::AddCutter(plane("far", 99.0, [1.0, 0.0, 0.0])),
+        Edit::AddImplant(Box::new(Implant::new("stem", Source::Builtin("hip/stem".to_owned())))),
+    ] {
+        apply(&mut case, edit).expect("planned");
+    }
+    case
+}
+
+fn corners() -> [Point; 8] {
+    std::array::from_fn(|c| {
+        Point::from(std::array::from_fn(|axis| if c >> axis & 1 == 1 { 10.0 } else { -10.0 }))
+    })
+}
+
+fn split(case: &mut Case, cutters: &[&str]) -> Result<(), EditError> {
+    let cutters = cutters.iter().map(|&c| c.to_owned()).collect();
+    apply(case, Edit::Split { volume: "ct".to_owned(), cutters, corners: corners() })
+}
+
+fn fused(case: &mut Case, ids: &[&str]) -> Result<(), EditError> {
+    let ids = ids.iter().map(|&id| id.to_owned()).collect();
+    apply(case, Edit::Fuse { ids, corners: corners() })
+}
+
+/// The id of the fragment that keeps these sides, in the order of the cutters' names.
+fn id_of(case: &Case, sides: &str) -> String {
+    let text = |f: &Fragment| f.keep.values().map(|s| if *s == Side::Plus { '+' } else { '-' }).collect();
+    case.fragments
+        .iter()
+        .find(|f| -> bool {
+            let t: String = text(f);
+            t == sides
+        })
+        .expect("a fragment")
+        .id
+        .clone()
+}
+
+#[test]
+fn a_split_makes_every_piece_that_is_not_empty() {
+    let mut case = planned();
+    split(&mut case, &["x", "y", "far"]).expect("split");
+    assert_eq!(case.fragments.len(), 4, "far cuts nothing off");
+    for p in [[3.0, 4.0, 5.0], [-3.0, 4.0, 5.0], [0.0, -1.0, 2.0], [-9.0, -9.0, -9.0]] {
+        let at = Point::from(p);
+        let holds = |f: &&Fragment| case.piece(f).keep.iter().all(|(c, s)| c.side(&at) == *s);
+        assert_eq!(case.fragments.iter().filter(holds).count(), 1, "{p:?} is in one piece");
+    }
+}
+
+#[test]
+fn a_split_keeps_what_was_planned() {
+    let mut case = planned();
+    split(&mut case, &["x"]).expect("split");
+    let (moved, kept) = (id_of(&case, "+"), id_of(&case, "-"));
+    let pose = Affine::translation(Vector::new(5.0, 0.0, 0.0));
+    apply(&mut case, Edit::SetFragmentPose { id: moved.clone(), pose }).expect("moved");
+    split(&mut case, &["x"]).expect("again");
+    assert_eq!(case.fragment(&moved).expect("same id").pose, pose, "the same split changes nothing");
+    split(&mut case, &["x", "y"]).expect("finer");
+    assert_eq!(case.fragments.len(), 4, "four");
+    for f in &case.fragments {
+        let of_moved = f.keep.get("x") == Some(&Side::Plus);
+        assert_eq!(f.pose == pose, of_moved, "parts of {moved} are where it was, parts of {kept} not");
+    }
+    let ids: std::collections::BTreeSet<&str> = case.fragments.iter().map(|f| f.id.as_str()).collect();
+    assert_eq!(ids.len(), 4, "ids are unique");
+}
+
+#[test]
+fn a_split_by_nothing_or_by_too_much_is_refused() {
+    let mut case = planned();
+    assert!(matches!(split(&mut case, &[]), Err(EditError::Split(split::SplitError::NoCutter))), "none");
+    assert!(matches!(split(&mut case, &["z"]), Err(EditError::Missing { kind: "cutter", .. })), "unknown");
+    assert_eq!(case, planned(), "nothing happened");
+}
+
+#[test]
+fn neighbours_fuse_and_diagonals_do_not() {
+    let mut case = planned();
+    split(&mut case, &["x", "y"]).expect("split");
+    let (pp, pm, mm) = (id_of(&case, "++"), id_of(&case, "+-"), id_of(&case, "--"));
+    let before = case.clone();
+    assert!(matches!(fused(&mut case, &[&pp, &mm]), Err(EditError::Fuse { .. })), "diagonal");
+    assert!(matches!(fused(&mut case, &[&pp, &pm, &mm]), Err(EditError::Fuse { .. })), "an L");
+    assert!(matches!(fused(&mut case, &[&pp]), Err(EditError::Fuse { .. })), "one");
+    assert_eq!(case, before, "nothing happened");
+    fused(&mut case, &[&pp, &pm]).expect("neighbours");
+    let keep = &case.fragment(&pp).expect("the first stays").keep;
+    assert_eq!(keep.iter().collect::<Vec<_>>(), [(&"x".to_owned(), &Side::Plus)], "y no longer cuts");
+    assert_eq!(case.fragments.len(), 3, "one fewer");
+}
+
+#[test]
+fn all_pieces_fuse_to_the_whole() {
+    let mut case = planned();
+    split(&mut case, &["far", "x", "y"]).expect("split");
+    let ids: Vec<String> = case.fragments.iter().map(|f| f.id.clone()).collect();
+    fused(&mut case, &ids.iter().map(String::as_str).collect::<Vec<_>>()).expect("all of them");
+    assert_eq!(case.fragments.len(), 1, "one");
+    let keep = &case.fragments[0].keep;
+    assert!(keep.keys().all(|id| id == "far"), "no cut through the volume is left: {keep:?}");
+}
+
+#[test]
+fn what_is_used_is_not_removed() {
+    let mut case = planned();
+    split(&mut case, &["x"]).expect("split");
+    let cut = apply(&mut case, Edit::RemoveCutter { id: "x".to_owned() });
+    assert!(matches!(cut, Err(EditError::InUse { kind: "cutter", .. })), "cutter");
+    let gone = apply(&mut case, Edit::RemoveVolume { id: "ct".to_owned() });
+    assert!(matches!(gone, Err(EditError::InUse { kind: "volume", .. })), "volume");
+    let (one, other) = (id_of(&case, "+"), id_of(&case, "-"));
+    apply(&mut case, Edit::RemoveFragment { id: one }).expect("one piece may go");
+    let last = apply(&mut case, Edit::RemoveFragment { id: other });
+    assert!(matches!(last, Err(EditError::LastFragment { .. })), "the last would show the whole");
+    apply(&mut case, Edit::Unsplit { volume: "ct".to_owned() }).expect("whole");
+    apply(&mut case, Edit::RemoveCutter { id: "x".to_owned() }).expect("cutter is free");
+    apply(&mut case, Edit::RemoveVolume { id: "ct".to_owned() }).expect("volume is free");
+}
+
+#[test]
+fn a_rename_is_followed_everywhere() {
+    let mut case = planned();
+    split(&mut case, &["x"]).expect("split");
+    let rename = |id: &str, to: &str| (id.to_owned(), to.to_owned());
+    let (id, to) = rename("x", "neck");
+    apply(&mut case, Edit::RenameCutter { id, to }).expect("cutter");
+    let (id, to) = rename("ct", "hip");
+    apply(&mut case, Edit::RenameVolume { id, to }).expect("volume");
+    for f in &case.fragments {
+        assert_eq!(f.volume, "hip", "volume");
+        assert_eq!(f.keep.keys().collect::<Vec<_>>(), ["neck"], "cutter");
+    }
+    let (id, to) = rename("neck", "y");
+    let taken = apply(&mut case, Edit::RenameCutter { id, to });
+    assert!(matches!(taken, Err(EditError::Taken { .. })), "taken");
+    let (id, to) = rename("stem", "");
+    let nameless = apply(&mut case, Edit::RenameImplant { id, to });
+    assert!(matches!(nameless, Err(EditError::Nameless { .. })), "empty");
+}
+
+#[test]
+fn numbers_out_of_range_are_refused() {
+    let before = planned();
+    let stem = || "stem".to_owned();
+    let mut m = Affine::identity().to_row_major();
+    m[0] = 2.0;
+    let stretched = Affine::from_row_major(&m).expect("affine");
+    let flat = Cutter::Plane { point: Point::origin(), normal: Vector::zeros() };
+    for edit in [
+        Edit::SetImplantOpacity { id: stem(), opacity: f64::NAN },
+        Edit::SetImplantOpacity { id: stem(), opacity: 1.1 },
+        Edit::SetImplantColor { id: stem(), color: [0.0, -0.1, 0.0] },
+        Edit::SetImplantScale { id: stem(), scale: 0.0 },
+        Edit::SetImplantScale { id: stem(), scale: f64::INFINITY },
+        Edit::SetImplantPose { id: stem(), pose: stretched },
+        Edit::SetVolumePose { id: "ct".to_owned(), pose: stretched },
+        Edit::SetCutter { id: "x".to_owned(), cutter: flat },
+        Edit::SetBackground([0.0, 0.0, 2.0]),
+        Edit::AddVolume(volume("ct")),
+        Edit::AddVolume(volume("")),
+        Edit::AddFragment(Fragment::new("f", "no", BTreeMap::new())),
+        Edit::AddFragment(Fragment::new("f", "ct", BTreeMap::from([("no".to_owned(), Side::Plus)]))),
+    ] {
+        let mut case = before.clone();
+        assert!(apply(&mut case, edit.clone()).is_err(), "{edit:?} was accepted");
+        assert_eq!(case, before, "{edit:?} left something");
+    }
+}
+
+#[test]
+fn only_changes_of_one_property_of_one_thing_are_one_drag() {
+    let pose = |id: &str| Edit::SetImplantPose { id: id.to_owned(), pose: Affine::identity() };
+    let opacity = Edit::SetImplantOpacity { id: "a".to_owned(), opacity: 0.5 };
+    assert!(pose("a").continues(&pose("a")), "one drag");
+    assert!(!pose("a").continues(&pose("b")), "another thing");
+    assert!(!pose("a").continues(&opacity), "another property");
+    let remove = Edit::RemoveCutter { id: "a".to_owned() };
+    assert!(!remove.continues(&remove.clone()), "removing is a step of its own");
+}

@@ -1,0 +1,252 @@
+//! The arguments, and the way from them to a job and an exit code.
+//!
+//! Exit codes: 0 done; 2 wrong usage; 3 unusable input; 4 no usable GPU; 1 anything else. Results go to
+//! standard output, everything else to standard error; an error is one sentence.
+
+use std::ffi::OsString;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::headless;
+use crate::host::HostError;
+
+/// Surgical planning: volumes, cuts, fragments and implants, in a window or without one.
+#[derive(Debug, Parser)]
+#[command(name = "osteotome", version, args_conflicts_with_subcommands = true)]
+pub struct Cli {
+    /// What to do without a window.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// A case, or data files and folders, to open in the window; none opens the built-in sample case.
+    #[arg(value_name = "CASE|FILES")]
+    pub paths: Vec<PathBuf>,
+}
+
+/// A job that needs no display.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Say what is in files, folders, archives or cases.
+    Info(InfoArgs),
+    /// Draw one picture of a case, or of a data file or folder.
+    Render(RenderArgs),
+    /// Make a texture file (KTX2) of a volume.
+    Compress(CompressArgs),
+    /// Measure run time beside error; one JSON object a line with --json.
+    Bench(BenchArgs),
+    /// Write the built-in sample case as files.
+    Demo(DemoArgs),
+}
+
+/// Arguments of `info`.
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// Files, folders, archives or cases.
+    #[arg(required = true, value_name = "PATH")]
+    pub paths: Vec<PathBuf>,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `render`.
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    /// A case file, or a data file or folder.
+    #[arg(value_name = "CASE")]
+    pub input: PathBuf,
+    /// The picture: .png (8-bit, over the background) or .exr (32-bit float RGBA, premultiplied).
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Width and height in pixels.
+    #[arg(long, value_name = "WxH", default_value = "768x768", value_parser = size)]
+    pub size: [u32; 2],
+    /// What draws it: the GPU, or the exact reference on the CPU.
+    #[arg(long, value_enum, default_value_t = Backend::Gpu)]
+    pub backend: Backend,
+    /// How fine the GPU samples a ray.
+    #[arg(long, value_enum, default_value_t = QualityName::Good)]
+    pub quality: QualityName,
+    /// Print one JSON object of figures.
+    #[arg(long)]
+    pub stats: bool,
+}
+
+/// What draws a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Backend {
+    /// The wgpu renderer.
+    Gpu,
+    /// The reference: exact, on all CPU cores.
+    Reference,
+}
+
+/// How fine the GPU samples a ray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum QualityName {
+    /// While the hand moves.
+    Draft,
+    /// One voxel.
+    Good,
+    /// As fine as it gets.
+    Finest,
+}
+
+/// Arguments of `compress`.
+#[derive(Debug, Args)]
+pub struct CompressArgs {
+    /// A data file or folder, or a case, whose first visible volume is taken.
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// The texture's format.
+    #[arg(long, value_enum)]
+    pub format: Format,
+    /// The KTX2 file.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Threads used; all cores if not given. The bytes do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// For colour formats: the transfer function, by name; else the case's own, or CT-Bone for CT and
+    /// MR-Default for all else.
+    #[arg(long, value_name = "NAME")]
+    pub preset: Option<String>,
+    /// Print one JSON object of figures.
+    #[arg(long)]
+    pub stats: bool,
+}
+
+/// A texture format that `compress` writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Opaque pre-classified colour, 4 bits a voxel.
+    Bc1,
+    /// Pre-classified colour and opacity, 8 bits a voxel.
+    Bc3,
+    /// Scalar, 4 bits a voxel.
+    Bc4,
+    /// Pre-classified colour and opacity, 32 bits a voxel.
+    Rgba8,
+    /// Scalar, 8 bits a voxel.
+    R8,
+    /// Scalar, 16 bits a voxel.
+    R16,
+}
+
+/// Arguments of `bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Which benchmark.
+    #[arg(value_enum, value_name = "NAME")]
+    pub name: BenchName,
+    /// The data: a case, file or folder; the built-in CT if not given.
+    #[arg(long, value_name = "PATH")]
+    pub data: Option<PathBuf>,
+    /// Print one JSON object a line instead of a table.
+    #[arg(long)]
+    pub json: bool,
+    /// Write SVG plots into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub plot: Option<PathBuf>,
+}
+
+/// A benchmark.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BenchName {
+    /// Frame time and error of textures and slice spacings.
+    Frame,
+    /// Time and error of making textures, beside making uncompressed ones.
+    Compress,
+}
+
+/// Arguments of `demo`.
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// The folder; made if it is not there.
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+}
+
+/// Largest side of a picture; pixels.
+pub const MAX_SIDE: u32 = 16_384;
+
+/// `640x480`.
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let wrong =
+        || format!("\"{text}\" is not a size: write WIDTHxHEIGHT, each 1 to {MAX_SIDE}, as in 640x480");
+    let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
+    let side = |text: &str| text.parse().ok().filter(|n| (1..=MAX_SIDE).contains(n)).ok_or_else(wrong);
+    Ok([side(width)?, side(height)?])
+}
+
+/// Runs the program on its arguments, the program's name first.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error")).init();
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are errors to clap, with code 0. Nothing is left to do if the terminal is gone.
+            drop(error.print());
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    let done = match &cli.command {
+        None => return window(cli.paths),
+        Some(Command::Info(args)) => headless::info::run(args),
+        Some(Command::Render(args)) => headless::render::run(args),
+        Some(Command::Compress(args)) => headless::compress::run(args),
+        Some(Command::Bench(args)) => headless::bench::run(args),
+        Some(Command::Demo(args)) => headless::demo::run(args),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => fail(&failure.to_string(), failure.exit_code()),
+    }
+}
+
+fn window(paths: Vec<PathBuf>) -> ExitCode {
+    match crate::host::run(paths) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let no_gpu = matches!(error, HostError::Window(eframe::Error::Wgpu(_)));
+            fail(&error.to_string(), if no_gpu { 4 } else { 1 })
+        }
+    }
+}
+
+/// One line on standard error, whatever the message holds.
+fn fail(message: &str, code: u8) -> ExitCode {
+    let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
+    // A closed standard error leaves nowhere to say that it is closed.
+    drop(writeln!(std::io::stderr(), "osteotome: {line}"));
+    ExitCode::from(code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_size_is_two_positive_numbers() {
+        assert_eq!(size("640x480"), Ok([640, 480]), "as written");
+        for wrong in ["640", "0x10", "10x0", "-1x5", "99999x2", "ax3", "1x2x3", ""] {
+            assert!(size(wrong).is_err(), "{wrong} was accepted");
+        }
+    }
+
+    #[test]
+    fn paths_without_a_command_open_the_window() {
+        let cli = Cli::try_parse_from(["osteotome", "a.json", "b.stl"]).expect("two paths");
+        assert!(cli.command.is_none() && cli.paths.len() == 2, "both paths");
+        assert!(Cli::try_parse_from(["osteotome"]).expect("nothing").paths.is_empty(), "the sample case");
+        assert!(Cli::try_parse_from(["osteotome", "render", "a.json"]).is_err(), "no --out");
+    }
+}

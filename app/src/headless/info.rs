@@ -1,0 +1,244 @@
+//! `info`: what is in files, folders, archives and cases.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use ::render::volume::cells::{CellKind, Field, Place};
+use ::render::volume::{Affine, CellGrid, Grid, TriangleMesh};
+use serde_json::{Value, json};
+
+use super::{Failure, Terminal, input, say};
+use crate::case::{Case, file};
+use crate::cli::InfoArgs;
+use crate::load::{self, Content, Item, Limits, Note, Severity};
+
+/// Says what is in each path.
+///
+/// With `--json`, one document: `{"items": [...]}`, an item being a volume, a series, a surface, a cell
+/// grid or a case, each with its path and notes.
+///
+/// # Errors
+/// [`Failure`] of the first path that gives nothing; what was found before it is not printed in JSON.
+pub fn run(args: &InfoArgs) -> Result<(), Failure> {
+    let mut all = Vec::new();
+    for path in &args.paths {
+        let items = items(path)?;
+        if !args.json {
+            say(&format!("{}: {}", path.display(), counted(items.len(), "item")))?;
+            for item in &items {
+                say(text(item).trim_end())?;
+            }
+        }
+        all.extend(items);
+    }
+    if args.json { say(&json!({ "items": all }).to_string()) } else { Ok(()) }
+}
+
+/// What is in one path, an object a thing.
+fn items(path: &Path) -> Result<Vec<Value>, Failure> {
+    if input::is_case(path) {
+        let case = file::load(path).map_err(Failure::Case)?;
+        return Ok(vec![case_json(&case, path)]);
+    }
+    let items = load::open(path, &Limits::default(), &Terminal::default())?;
+    Ok(items.iter().map(|item| item_json(item, path)).collect())
+}
+
+fn case_json(case: &Case, path: &Path) -> Value {
+    let source = |id: &String, source: &crate::case::Source| json!({"id": id, "source": source.to_string()});
+    json!({
+        "path": path.display().to_string(),
+        "kind": "case",
+        "format": "Osteotome case",
+        "name": case.name,
+        "volumes": case.volumes.iter().map(|v| source(&v.id, &v.source)).collect::<Vec<_>>(),
+        "cutters": case.cutters.iter().map(|c| c.id.clone()).collect::<Vec<_>>(),
+        "fragments": case.fragments.iter().map(|f| f.id.clone()).collect::<Vec<_>>(),
+        "implants": case.implants.iter().map(|i| source(&i.id, &i.source)).collect::<Vec<_>>(),
+        "notes": [],
+    })
+}
+
+fn item_json(item: &Item, path: &Path) -> Value {
+    let mut value = match &item.content {
+        Content::Volume(grid) => grid_json(grid),
+        Content::Series(series) => {
+            let mut value = series.steps().first().map_or_else(|| json!({}), |g| grid_json(g));
+            value["kind"] = json!("series");
+            value["steps"] = json!(series.len());
+            value["times_secs"] = json!(series.times_secs());
+            value["range"] = json!(series.range());
+            value
+        }
+        Content::Mesh(mesh) => mesh_json(mesh),
+        Content::Cells(cells) => cells_json(cells),
+    };
+    value["path"] = json!(path.display().to_string());
+    value["name"] = json!(item.name);
+    value["format"] = json!(item.format);
+    value["modality"] = json!(item.modality);
+    value["notes"] = item.notes.iter().map(note_json).collect();
+    value
+}
+
+fn note_json(note: &Note) -> Value {
+    let severity = match note.severity {
+        Severity::Fact => "fact",
+        Severity::Caution => "caution",
+        Severity::Loss => "loss",
+    };
+    json!({"severity": severity, "code": note.code, "text": note.text})
+}
+
+fn grid_json(grid: &Grid) -> Value {
+    json!({
+        "kind": "volume",
+        "extent": grid.extent(),
+        "spacing_mm": grid.spacing_mm(),
+        "orientation": orientation(grid.world_from_voxel()),
+        "world_from_voxel": grid.world_from_voxel().to_row_major(),
+        "samples": grid.samples().kind(),
+        "range": grid.range(),
+        "rescale": {"slope": grid.rescale().slope, "intercept": grid.rescale().intercept},
+        "padding": grid.padding(),
+        "non_finite": grid.non_finite(),
+    })
+}
+
+fn mesh_json(mesh: &TriangleMesh) -> Value {
+    let [low, high] = mesh.bounds();
+    json!({
+        "kind": "surface",
+        "vertices": mesh.positions().len(),
+        "triangles": mesh.triangles().len(),
+        "bounds_mm": [low.coords.as_slice(), high.coords.as_slice()],
+        "size_mm": (high - low).as_slice(),
+    })
+}
+
+fn cells_json(cells: &CellGrid) -> Value {
+    let [low, high] = cells.bounds();
+    let kinds: serde_json::Map<String, Value> = CellKind::ALL
+        .iter()
+        .filter(|kind| cells.count(**kind) > 0)
+        .map(|kind| (kind.name().to_owned(), json!(cells.count(*kind))))
+        .collect();
+    let fields = |place: Place| -> Vec<Value> {
+        let first = cells.steps().first();
+        first.map_or_else(Vec::new, |s| s.fields(place).iter().map(|f| field_json(cells, place, f)).collect())
+    };
+    json!({
+        "kind": "cells",
+        "points": cells.points().len(),
+        "cells": cells.len(),
+        "cells_by_kind": kinds,
+        "steps": cells.steps().len(),
+        "times": cells.steps().iter().map(|s| s.time).collect::<Vec<_>>(),
+        "bounds_mm": [low.coords.as_slice(), high.coords.as_slice()],
+        "point_fields": fields(Place::Points),
+        "cell_fields": fields(Place::Cells),
+    })
+}
+
+fn field_json(cells: &CellGrid, place: Place, field: &Field) -> Value {
+    let range = |component| cells.range(place, field.name(), component);
+    let ranges: Vec<Option<[f64; 2]>> = (0..field.components()).map(range).collect();
+    json!({"name": field.name(), "components": field.components(), "ranges": ranges})
+}
+
+/// Towards where each array axis runs, by its greatest part: `"LPS"`; `"LPS, oblique"` where an axis
+/// leaves its world axis by more than half a degree.
+fn orientation(world_from_voxel: &Affine) -> String {
+    let linear = world_from_voxel.linear();
+    let mut letters = String::new();
+    let mut oblique = false;
+    for column in linear.column_iter() {
+        let axis = column.iamax();
+        let (towards, away) = [('L', 'R'), ('P', 'A'), ('S', 'I')][axis];
+        letters.push(if column[axis] >= 0.0 { towards } else { away });
+        oblique |= column[axis].abs() < column.norm() * 0.5_f64.to_radians().cos();
+    }
+    if oblique {
+        letters.push_str(", oblique");
+    }
+    letters
+}
+
+/// An item for people: a line of what it is, and indented lines of its figures and notes.
+fn text(item: &Value) -> String {
+    let mut out = String::new();
+    let word = |key: &str| item[key].as_str().unwrap_or_default();
+    let mut head = format!("  {} \"{}\", {}", word("kind"), word("name"), word("format"));
+    if let Some(modality) = item["modality"].as_str() {
+        head.push_str(&format!(", {modality}"));
+    }
+    out.push_str(&head);
+    out.push('\n');
+    let Value::Object(map) = item else { return out };
+    for (key, value) in map {
+        let value = match value {
+            _ if matches!(key.as_str(), "kind" | "name" | "format" | "modality" | "path" | "notes") => {
+                continue;
+            }
+            Value::String(text) => text.clone(),
+            Value::Array(list) if list.len() > 16 => format!("{} of them", list.len()),
+            other => other.to_string(),
+        };
+        line(&mut out, key, &value);
+    }
+    for note in item["notes"].as_array().into_iter().flatten() {
+        let part = |key: &str| note[key].as_str().unwrap_or_default();
+        line(&mut out, part("severity"), &format!("{} [{}]", part("text"), part("code")));
+    }
+    out
+}
+
+fn line(out: &mut String, key: &str, value: &str) {
+    // Writing to a string cannot fail.
+    drop(writeln!(out, "    {key}: {value}"));
+}
+
+fn counted(count: usize, thing: &str) -> String {
+    if count == 1 { format!("1 {thing}") } else { format!("{count} {thing}s") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::render::volume::{Point, Rescale, Samples, Vector};
+
+    fn grid(x: [f64; 3], y: [f64; 3], z: [f64; 3]) -> Grid {
+        let columns = [x, y, z].map(Vector::from);
+        let affine = Affine::from_columns(columns[0], columns[1], columns[2], Point::origin());
+        let samples = Samples::I16(vec![-5, 7]);
+        Grid::new([2, 1, 1], samples, Rescale::default(), affine.expect("affine")).expect("grid")
+    }
+
+    #[test]
+    fn the_orientation_is_where_the_axes_run() {
+        let of = |x, y, z| orientation(grid(x, y, z).world_from_voxel());
+        assert_eq!(of([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]), "LPS", "world's own");
+        assert_eq!(of([-1.0, 0.0, 0.0], [0.0, 0.0, -2.0], [0.0, 3.0, 0.0]), "RIP", "turned");
+        assert_eq!(of([1.0, 0.1, 0.0], [-0.1, 1.0, 0.0], [0.0, 0.0, 1.0]), "LPS, oblique", "6 degrees");
+    }
+
+    #[test]
+    fn a_volume_has_its_figures_and_notes_in_both_forms() {
+        let item = Item {
+            name: "chest".to_owned(),
+            format: "NRRD",
+            modality: Some("CT".to_owned()),
+            content: Content::Volume(grid([0.5, 0.0, 0.0], [0.0, 0.7, 0.0], [0.0, 0.0, 2.0])),
+            notes: vec![Note { severity: Severity::Caution, code: "nrrd.units", text: "no unit".to_owned() }],
+        };
+        let value = item_json(&item, Path::new("a.nrrd"));
+        assert_eq!(value["extent"], json!([2, 1, 1]), "extent");
+        assert_eq!(value["spacing_mm"], json!([0.5, 0.7, 2.0]), "spacing");
+        assert_eq!(value["range"], json!([-5.0, 7.0]), "range");
+        assert_eq!(value["notes"][0]["code"], "nrrd.units", "note");
+        let text = text(&value);
+        for part in ["volume \"chest\", NRRD, CT", "range: [-5.0,7.0]", "caution: no unit [nrrd.units]"] {
+            assert!(text.contains(part), "{part} is in {text}");
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Small SVG charts: points of one or more series over two axes, one of which may be logarithmic.
+
+use std::fmt::Write as _;
+
+/// Points of one colour and name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// For the legend.
+    pub name: String,
+    /// `(x, y)`, with a label each; points that are not finite are left out.
+    pub points: Vec<(f64, f64, String)>,
+}
+
+/// A chart of run time against error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    /// Above it.
+    pub title: String,
+    /// Under the horizontal axis, with its unit; the axis is logarithmic.
+    pub x: String,
+    /// Beside the vertical axis, with its unit; the axis is linear from 0.
+    pub y: String,
+    /// What is drawn.
+    pub series: Vec<Series>,
+}
+
+const WIDTH: f64 = 720.0;
+const HEIGHT: f64 = 440.0;
+/// Left, top, right and bottom of the frame.
+const FRAME: [f64; 4] = [70.0, 40.0, 560.0, 390.0];
+/// Told apart with the usual kinds of colour blindness (Okabe and Ito, 2008).
+const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+
+impl Chart {
+    /// The SVG document.
+    pub fn svg(&self) -> String {
+        let finite = |p: &&(f64, f64, String)| p.0 > 0.0 && p.0.is_finite() && p.1.is_finite();
+        let all: Vec<&(f64, f64, String)> =
+            self.series.iter().flat_map(|s| &s.points).filter(finite).collect();
+        let decade =
+            |pick: fn(f64, f64) -> f64, start: f64| all.iter().map(|p| p.0.log10()).fold(start, pick);
+        let (low, high) =
+            (decade(f64::min, f64::INFINITY).floor(), decade(f64::max, f64::NEG_INFINITY).ceil());
+        let (low, high) = if low < high { (low, high) } else { (low.min(0.0).max(-9.0), low.max(0.0) + 1.0) };
+        let top = all.iter().map(|p| p.1).fold(1.0, f64::max) * 1.08;
+        let [left, upper, right, lower] = FRAME;
+        let x = |v: f64| left + (v.log10() - low) / (high - low) * (right - left);
+        let y = |v: f64| lower - v / top * (lower - upper);
+
+        let mut out = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
+             viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" font-size=\"12\">\n\
+             <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
+             <rect x=\"{left}\" y=\"{upper}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888\"/>\n",
+            right - left,
+            lower - upper
+        );
+        let mut text = |at: [f64; 2], anchor: &str, what: &str| {
+            // Writing to a string cannot fail.
+            drop(writeln!(
+                out,
+                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
+                at[0],
+                at[1],
+                escaped(what)
+            ));
+        };
+        text([WIDTH / 2.0, 24.0], "middle", &self.title);
+        text([f64::midpoint(left, right), lower + 36.0], "middle", &self.x);
+        text([8.0, upper - 10.0], "start", &self.y);
+        for power in low as i32..=high as i32 {
+            let value = 10.0_f64.powi(power);
+            text([x(value), lower + 18.0], "middle", &value.to_string());
+        }
+        for tick in 0..=4 {
+            let value = top * f64::from(tick) / 4.0;
+            text([left - 6.0, y(value) + 4.0], "end", &format!("{value:.1}"));
+        }
+        for (i, series) in self.series.iter().enumerate() {
+            let at = [right + 28.0, upper + 14.0 + 20.0 * i as f64];
+            text(at, "start", &series.name);
+            for point in series.points.iter().filter(finite) {
+                text([x(point.0) + 7.0, y(point.1) - 5.0], "start", &point.2);
+            }
+        }
+        for (i, series) in self.series.iter().enumerate() {
+            let colour = COLOURS[i % COLOURS.len()];
+            let mut dot = |cx: f64, cy: f64| {
+                drop(writeln!(out, "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"4.5\" fill=\"{colour}\"/>"));
+            };
+            dot(right + 18.0, upper + 10.0 + 20.0 * i as f64);
+            for point in series.points.iter().filter(finite) {
+                dot(x(point.0), y(point.1));
+            }
+        }
+        out.push_str("</svg>\n");
+        out
+    }
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart(points: Vec<(f64, f64, String)>) -> String {
+        let series = vec![Series { name: "a < b".to_owned(), points }];
+        Chart { title: "t".to_owned(), x: "ms".to_owned(), y: "dB".to_owned(), series }.svg()
+    }
+
+    #[test]
+    fn a_point_lies_where_its_numbers_say() {
+        let svg = chart(vec![
+            (10.0, 0.0, "p".to_owned()),
+            (1000.0, 40.0, "q".to_owned()),
+            (5.0, f64::INFINITY, "lossless".to_owned()),
+        ]);
+        let [left, _, right, lower] = FRAME;
+        let dots: Vec<&str> = svg.lines().filter(|l| l.starts_with("<circle")).collect();
+        assert_eq!(dots.len(), 3, "the legend and two finite points");
+        assert!(dots[1].contains(&format!("cx=\"{left:.1}\" cy=\"{lower:.1}\"")), "{}", dots[1]);
+        assert!(dots[2].contains(&format!("cx=\"{right:.1}\"")), "{}", dots[2]);
+        assert!(svg.contains("a &lt; b"), "text is escaped");
+    }
+
+    #[test]
+    fn a_chart_without_points_is_still_a_chart() {
+        let svg = chart(Vec::new());
+        assert!(svg.ends_with("</svg>\n") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    }
+}

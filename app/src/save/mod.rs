@@ -1,0 +1,8 @@
+//! Data and pictures as the bytes of files: the other way round of [`crate::load`].
+//!
+//! Everything is made in memory and written by [`crate::case::file::write_whole`], so that a file is whole
+//! or not there.
+
+pub mod nrrd;
+pub mod picture;
+pub mod stl;

@@ -1,0 +1,163 @@
+//! Every registered tool's panel, drawn by being listed; and what a few of their widgets ask for.
+
+use std::sync::Arc;
+
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use render::volume::{
+    Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Side, Transfer, TriangleMesh, Vector,
+};
+
+use super::register_all;
+use crate::case::assets::{Asset, Data, Key};
+use crate::case::{Assets, Case, Edit, Fragment, Implant, NamedCutter, Source, Volume};
+use crate::host::context::{Request, Selection, ToolContext};
+use crate::host::overlay::Overlay;
+use crate::host::registry::Registry;
+use crate::host::tool::ToolId;
+use crate::host::views::Views;
+
+/// What a tool is drawn in.
+#[derive(Default)]
+struct Bench {
+    case: Case,
+    assets: Assets,
+    selection: Selection,
+    views: Views,
+    edits: Vec<Edit>,
+    requests: Vec<Request>,
+    registry: Registry,
+    drawn: usize,
+}
+
+fn asset(key: Key, data: Data) -> Arc<Asset> {
+    Arc::new(Asset { key, name: "made".into(), format: "test", modality: None, data, notes: Vec::new() })
+}
+
+/// A bench with one of everything: a loaded volume in two fragments, a plane, a cylinder, an implant.
+fn bench() -> Bench {
+    let samples = (0..8 * 8 * 8).map(|i| i as i16).collect();
+    let grid = Grid::new([8, 8, 8], Samples::I16(samples), Rescale::default(), Affine::identity());
+    let corners = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 4.0, 0.0]].map(Point::from).to_vec();
+    let mesh = TriangleMesh::new(corners, vec![[0, 1, 2]]).expect("mesh");
+    let point = |value, a| ControlPoint { value, rgba: [1.0, 0.8, 0.6, a] };
+    let transfer = Transfer::new(vec![point(100.0, 0.0), point(400.0, 0.5)], 1.0).expect("transfer");
+    let volume = Volume::new("ct", Source::Builtin("test/ct".into()), Arc::new(transfer));
+    let implant = Implant::new("plate", Source::Builtin("test/plate".into()));
+    let mut assets = Assets::default();
+    assets.insert(asset(Key::of_volume(&volume), Data::Grid(Arc::new(grid.expect("grid")))));
+    assets.insert(asset(Key::of_implant(&implant), Data::Mesh(Arc::new(mesh))));
+    let plane = Cutter::plane(Point::new(3.5, 3.5, 3.5), Vector::x()).expect("plane");
+    let tube = Cutter::cylinder(Point::new(3.5, 3.5, 3.5), Vector::z(), 2.0).expect("tube");
+    let piece = |id: &str, side| Fragment::new(id, "ct", [("cut".to_owned(), side)].into());
+    let case = Case {
+        volumes: vec![volume],
+        implants: vec![implant],
+        cutters: vec![NamedCutter::new("cut", plane), NamedCutter::new("drill", tube)],
+        fragments: vec![piece("left part", Side::Plus), piece("right part", Side::Minus)],
+        ..Case::default()
+    };
+    let mut bench = Bench { case, assets, views: Views::new(), ..Bench::default() };
+    register_all(&mut bench.registry).expect("no two tools of one id");
+    bench.selection.repair(&bench.case);
+    bench.views.adopt(&bench.case, &bench.assets);
+    bench
+}
+
+/// The panel of one tool, as the window shows it.
+fn panel(bench: Bench, id: ToolId) -> Harness<'static, Bench> {
+    let draw = move |ui: &mut egui::Ui, bench: &mut Bench| {
+        let Bench { case, assets, selection, views, edits, requests, registry, drawn } = bench;
+        let mut context = ToolContext::new(case, assets, selection, views, edits, requests);
+        let tool = registry.tool_mut(id).expect("a registered tool");
+        tool.panel_ui(&mut context, ui);
+        let mut overlay = Overlay::default();
+        tool.draw(&context, &mut overlay);
+        *drawn = overlay.len();
+    };
+    Harness::builder().with_size([380.0, 1100.0]).build_ui_state(draw, bench)
+}
+
+fn ids() -> Vec<ToolId> {
+    bench().registry.titles().map(|(id, _)| id).collect()
+}
+
+#[test]
+fn every_registered_panel_draws_with_and_without_a_case() {
+    assert!(ids().len() >= 5, "volumes, transfer, cutting, fragments, implants");
+    for id in ids() {
+        let mut full = panel(bench(), id);
+        full.run();
+        let width = full.root().rect().width();
+        assert!(full.root().children().count() > 0, "{id} shows something");
+        assert!(width <= 381.0, "{id} fits the panel's width, not {width}");
+        assert!(full.state().edits.is_empty(), "{id} asks for nothing by itself: {:?}", full.state().edits);
+        let mut empty = bench();
+        (empty.case, empty.assets, empty.selection) = Default::default();
+        let mut empty = panel(empty, id);
+        empty.run();
+        assert!(empty.state().edits.is_empty(), "{id} asks for nothing of an empty case");
+    }
+}
+
+#[test]
+fn a_plane_is_added_through_the_crosshair() {
+    let mut bench = bench();
+    bench.views.crosshair = Some(Point::new(1.0, 2.0, 3.0));
+    let mut panel = panel(bench, ToolId("cutting"));
+    panel.get_by_label("Coronal plane").click();
+    panel.run();
+    let [Edit::AddCutter(cutter)] = panel.state().edits.as_slice() else {
+        panic!("one new cutter, not {:?}", panel.state().edits)
+    };
+    let Cutter::Plane { point, normal } = cutter.cutter else { panic!("a plane") };
+    assert_eq!((point, normal), (Point::new(1.0, 2.0, 3.0), -Vector::y()), "there, facing the front");
+    assert!(panel.state().selection.split_by.contains(&cutter.id), "ready to split by");
+    assert!(panel.state().drawn > 5, "the chosen cutter has a handle");
+}
+
+#[test]
+fn splitting_names_the_chosen_cutters_and_the_box() {
+    let mut bench = bench();
+    bench.selection.split_by = ["cut".to_owned(), "drill".to_owned()].into();
+    let mut panel = panel(bench, ToolId("fragments"));
+    panel.get_by_label("Split into pieces").click();
+    panel.run();
+    let [Edit::Split { volume, cutters, corners }] = panel.state().edits.as_slice() else {
+        panic!("one split, not {:?}", panel.state().edits)
+    };
+    assert_eq!((volume.as_str(), cutters.len()), ("ct", 2), "the volume, both cutters");
+    assert_eq!(corners[7], Point::new(7.5, 7.5, 7.5), "the box reaches to the voxels' edges");
+}
+
+#[test]
+fn hiding_a_volume_is_one_edit() {
+    let mut panel = panel(bench(), ToolId("volumes"));
+    panel.get_by_label("Show ct").click();
+    panel.run();
+    let wanted = Edit::SetVolumeVisible { id: "ct".to_owned(), visible: false };
+    assert_eq!(panel.state().edits, [wanted], "that and nothing else");
+}
+
+#[test]
+fn opening_is_asked_of_the_host() {
+    let mut panel = panel(bench(), ToolId("implants"));
+    panel.get_by_label("Open a surface…").click();
+    panel.run();
+    assert_eq!(panel.state().requests, [Request::OpenFile], "a dialog");
+}
+
+#[test]
+fn an_implant_goes_to_the_crosshair() {
+    let mut bench = bench();
+    bench.views.crosshair = Some(Point::new(11.0, 12.0, 13.0));
+    let mut panel = panel(bench, ToolId("implants"));
+    panel.get_by_label("Put it at the crosshair").click();
+    panel.run();
+    let [Edit::SetImplantPose { id, pose }] = panel.state().edits.as_slice() else {
+        panic!("one move, not {:?}", panel.state().edits)
+    };
+    let middle = pose.point(&Point::new(1.0, 2.0, 0.0));
+    assert_eq!(id, "plate", "the chosen one");
+    assert!((middle - Point::new(11.0, 12.0, 13.0)).norm() < 1e-12, "its middle is there: {middle}");
+}

@@ -1,0 +1,9 @@
+//! What crosses crates, as one test binary: each links wgpu and egui.
+#![expect(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail loudly")]
+
+mod bad_files;
+mod headless;
+mod layering;
+mod loading;
+mod support;
+mod window;

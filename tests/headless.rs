@@ -1,0 +1,296 @@
+//! The command line, as a process: what it prints, where, and with which exit code.
+
+use std::path::Path;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use crate::support::compare::{colours, difference, open_rgb};
+use crate::support::program::{Outcome, run};
+use crate::support::{cases, gpu_wanted};
+
+/// Software rendering in a development build on a busy machine.
+const LIMIT: Duration = Duration::from_mins(2);
+
+fn osteotome(args: &[&str]) -> Outcome {
+    run(args, LIMIT)
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a temporary path is plain text")
+}
+
+fn assert_error(outcome: &Outcome, code: i32, names: &str) {
+    assert_eq!(outcome.code(), code, "the exit code: {}{}", outcome.stdout, outcome.stderr);
+    assert!(outcome.stdout.is_empty(), "an error is no result: {}", outcome.stdout);
+    assert!(outcome.sentence().contains(names), "the error names {names}: {}", outcome.stderr);
+    assert!(
+        !outcome.stderr.contains("RUST_BACKTRACE"),
+        "an error is a sentence, no trace: {}",
+        outcome.stderr
+    );
+}
+
+#[test]
+fn help_and_version_are_asked_for_and_succeed() {
+    let help = osteotome(&["--help"]);
+    assert_eq!(help.code(), 0, "{}", help.stderr);
+    for command in ["info", "render", "compress", "bench", "demo"] {
+        assert!(help.stdout.contains(command), "the help tells of {command}: {}", help.stdout);
+    }
+    let version = osteotome(&["--version"]);
+    assert_eq!((version.code(), version.stdout.trim()), (0, "osteotome 0.1.0"), "the version");
+}
+
+#[test]
+fn wrong_usage_is_exit_code_2() {
+    for args in [
+        &["render"][..],
+        &["render", "case.json"],
+        &["render", "case.json", "--out", "p.png", "--size", "wide"],
+        &["render", "case.json", "--out", "p.png", "--size", "0x10"],
+        &["render", "case.json", "--out", "p.png", "--backend", "abacus"],
+        &["info"],
+        &["info", "--no-such-flag"],
+    ] {
+        let outcome = osteotome(args);
+        assert_eq!(outcome.code(), 2, "{args:?}: {}{}", outcome.stdout, outcome.stderr);
+        assert!(!outcome.stderr.trim().is_empty(), "{args:?} says what is wrong");
+    }
+}
+
+#[test]
+fn unusable_input_is_exit_code_3_and_one_sentence_that_names_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("p.png");
+    assert_error(&osteotome(&["info", "no_such_file.nrrd"]), 3, "no_such_file.nrrd");
+    assert_error(
+        &osteotome(&["render", "no_such_case.json", "--out", text(&picture)]),
+        3,
+        "no_such_case.json",
+    );
+
+    let good = cases::cut_ball(folder.path());
+    for (names, at, value) in [
+        ("gone.nrrd", "/volumes/0/source", json!("gone.nrrd")),
+        ("case.json", "/osteotome", json!(99)),
+        ("case.json", "/fragments/0/volume", json!("nobody")),
+        ("case.json", "/fragments/0/keep", json!({"nothing": "+"})),
+        ("case.json", "/cutters/0/plane/normal", json!([0, 0, 0])),
+        ("case.json", "/volumes/0/transfer/unit_mm", json!(0)),
+    ] {
+        let mut case = good.clone();
+        *case.pointer_mut(at).unwrap() = value;
+        let path = cases::write_case(folder.path(), &case);
+        let outcome = osteotome(&["render", text(&path), "--out", text(&picture), "--backend", "reference"]);
+        assert_error(&outcome, 3, names);
+        assert!(!picture.exists(), "no picture of a case broken at {at}");
+    }
+    std::fs::write(folder.path().join("case.json"), "{ \"osteotome\": 1,").unwrap();
+    let cut = osteotome(&["render", text(&folder.path().join("case.json")), "--out", text(&picture)]);
+    assert_error(&cut, 3, "case.json");
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = cases::write_case(folder.path(), &cases::cut_ball(folder.path()));
+    let nowhere = folder.path().join("no_such_folder").join("p.png");
+    let size = ["--size", "16x16", "--backend", "reference"];
+    let outcome = osteotome(&[&["render", text(&case), "--out", text(&nowhere)], &size[..]].concat());
+    assert_error(&outcome, 1, "no_such_folder");
+    let odd = folder.path().join("p.bmp");
+    let outcome = osteotome(&[&["render", text(&case), "--out", text(&odd)], &size[..]].concat());
+    assert_error(&outcome, 2, "p.bmp");
+}
+
+#[test]
+fn a_homogeneous_slab_has_the_opacity_of_its_thickness() {
+    let folder = tempfile::tempdir().unwrap();
+    // 24 voxels of 1.5 mm are 36 mm, edge to edge; 3 % in each 2 mm.
+    cases::write_nrrd(&folder.path().join("slab.nrrd"), [24; 3], 1.5, |_| 100);
+    let case = json!({
+        "osteotome": 1, "name": "slab",
+        "volumes": [{"id": "v", "source": "slab.nrrd", "texture": "r32f", "transfer": {
+            "points": [[0, 1, 0.5, 0.25, 0.03]], "unit_mm": 2.0}}],
+        "camera": {"eye": [17.25, -100, 17.25], "target": [17.25, 17.25, 17.25], "up": [0, 0, 1], "parallel_mm": 60},
+        "background": [0.25, 0.25, 0.25]
+    });
+    let case = cases::write_case(folder.path(), &case);
+    let opacity = 1.0 - 0.97_f64.powf(18.0);
+    let mut backends = vec!["reference"];
+    if gpu_wanted() {
+        backends.push("gpu");
+    }
+    for backend in backends {
+        let picture = folder.path().join(format!("{backend}.exr"));
+        let size = ["--size", "40x20", "--quality", "finest"];
+        let args = ["render", text(&case), "--out", text(&picture), "--backend", backend];
+        let outcome = osteotome(&[&args, &size[..]].concat());
+        assert_eq!(outcome.code(), 0, "{backend}: {}", outcome.stderr);
+        assert!(
+            outcome.stdout.is_empty(),
+            "without --stats nothing is on standard output: {}",
+            outcome.stdout
+        );
+        let drawn = image::open(&picture).unwrap().to_rgba32f();
+        assert_eq!(drawn.dimensions(), (40, 20), "{backend}: the size asked for");
+        let middle = drawn.get_pixel(20, 10).0.map(f64::from);
+        for (channel, full) in [1.0, 0.5, 0.25, 1.0].into_iter().enumerate() {
+            let apart = (middle[channel] - full * opacity).abs();
+            assert!(apart < 0.25 / 255.0, "{backend}: {middle:?} is premultiplied by {opacity}");
+        }
+        assert_eq!(drawn.get_pixel(1, 1).0, [0.0; 4], "{backend}: without background, nothing is nothing");
+    }
+}
+
+#[test]
+fn the_gpu_draws_a_cut_and_implanted_case_as_the_reference_does() {
+    if !gpu_wanted() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let case = cases::write_case(folder.path(), &cases::cut_ball(folder.path()));
+    let draw = |backend: &str| {
+        let picture = folder.path().join(format!("{backend}.png"));
+        let args = ["render", text(&case), "--out", text(&picture), "--backend", backend];
+        let outcome =
+            osteotome(&[&args[..], &["--size", "128x96", "--quality", "finest", "--stats"]].concat());
+        let stats = outcome.json();
+        assert!(stats.is_object(), "{backend}: the statistics are one object: {stats}");
+        open_rgb(&picture)
+    };
+    let (gpu, reference) = (draw("gpu"), draw("reference"));
+    assert_eq!(gpu.dimensions(), (128, 96), "the size asked for");
+    assert!(colours(&reference) > 200, "a picture of something: {} colours", colours(&reference));
+    let (psnr, largest) = difference(&gpu, &reference);
+    assert!(psnr >= 45.0 && largest <= 8, "the two agree: PSNR {psnr:.1} dB, largest {largest}/255");
+}
+
+#[test]
+fn every_texture_draws_and_the_lossy_ones_say_so() {
+    if !gpu_wanted() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut case = cases::cut_ball(folder.path());
+    let mut first = None;
+    for (texture, lossy) in [("r16", false), ("r32f", false), ("bc4", true), ("rgba8", true), ("bc3", true)] {
+        case["volumes"][0]["texture"] = json!(texture);
+        let path = cases::write_case(folder.path(), &case);
+        let picture = folder.path().join(format!("{texture}.png"));
+        let args = ["render", text(&path), "--out", text(&picture), "--size", "96x72", "--stats"];
+        let stats = osteotome(&args).json();
+        let drawn = open_rgb(&picture);
+        let textures = stats["textures"].as_array().unwrap_or_else(|| panic!("{texture}: {stats}"));
+        assert!(!textures.is_empty(), "{texture}: {stats}");
+        for made in textures {
+            assert_eq!(made["format"], texture, "the texture asked for: {stats}");
+            assert_eq!(made["lossy"], lossy, "{texture}: {stats}");
+        }
+        let said = stats["statement"].as_str().unwrap_or_default();
+        assert_eq!(said.contains(texture), lossy, "what is lossy is said: {stats}");
+        let (psnr, _) = difference(first.get_or_insert_with(|| drawn.clone()), &drawn);
+        assert!(psnr > 28.0, "{texture} draws the same thing: PSNR {psnr:.1} dB");
+    }
+}
+
+#[test]
+fn moving_the_whole_case_by_a_kilometre_changes_nothing() {
+    if !gpu_wanted() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let near = cases::cut_ball(folder.path());
+    let by = [1.0e6, -1.0e6, 1.0e6];
+    let mut far = near.clone();
+    let shift = |point: &mut Value| {
+        for (axis, by) in by.iter().enumerate() {
+            point[axis] = json!(point[axis].as_f64().unwrap() + by);
+        }
+    };
+    let moved = json!([1, 0, 0, by[0], 0, 1, 0, by[1], 0, 0, 1, by[2], 0, 0, 0, 1]);
+    far["volumes"][0]["pose"] = moved.clone();
+    far["implants"][0]["pose"] = moved;
+    for point in ["/camera/eye", "/camera/target", "/cutters/0/plane/point"] {
+        shift(far.pointer_mut(point).unwrap());
+    }
+    // The fragment's pose is about the world's origin: move there, turn, move back.
+    let pose = |row: usize, column: usize| near["fragments"][0]["pose"][4 * row + column].as_f64().unwrap();
+    for row in 0..3 {
+        let turned: f64 = (0..3).map(|column| pose(row, column) * by[column]).sum();
+        far["fragments"][0]["pose"][4 * row + 3] = json!(pose(row, 3) + by[row] - turned);
+    }
+    let draw = |case: &Value, name: &str| {
+        let path = cases::write_case(folder.path(), case);
+        let picture = folder.path().join(name);
+        let outcome = osteotome(&["render", text(&path), "--out", text(&picture), "--size", "96x72"]);
+        assert_eq!(outcome.code(), 0, "{name}: {}", outcome.stderr);
+        open_rgb(&picture)
+    };
+    let near = draw(&near, "near.png");
+    assert!(colours(&near) > 200, "a picture of something");
+    let (_, largest) = difference(&near, &draw(&far, "far.png"));
+    assert!(largest <= 1, "the largest change of a channel is {largest}/255");
+}
+
+#[test]
+fn the_demo_case_is_written_as_files_that_info_and_render_take() {
+    let folder = tempfile::tempdir().unwrap();
+    let demo = folder.path().join("demo");
+    let outcome = osteotome(&["demo", text(&demo)]);
+    assert_eq!(outcome.code(), 0, "{}", outcome.stderr);
+    let case = demo.join("case.json");
+    let document: Value = serde_json::from_str(&std::fs::read_to_string(&case).unwrap()).unwrap();
+    assert_eq!(document["osteotome"], 1, "the case file's version");
+    assert!(document["volumes"].as_array().unwrap().len() >= 2, "a CT and an MRI");
+    assert!(!document["implants"].as_array().unwrap().is_empty(), "an implant");
+    for source in ["volumes", "implants"].iter().flat_map(|list| document[*list].as_array().unwrap()) {
+        let path = demo.join(source["source"].as_str().unwrap());
+        let info = osteotome(&["info", text(&path), "--json"]);
+        assert_eq!(info.code(), 0, "{}: {}", path.display(), info.stderr);
+    }
+    if gpu_wanted() {
+        let picture = folder.path().join("p.png");
+        let outcome = osteotome(&["render", text(&case), "--out", text(&picture), "--size", "128x128"]);
+        assert_eq!(outcome.code(), 0, "{}", outcome.stderr);
+        assert!(colours(&open_rgb(&picture)) > 500, "a picture of a hip, not of nothing");
+    }
+}
+
+#[test]
+fn keys_that_a_case_does_not_know_are_no_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut case = cases::cut_ball(folder.path());
+    case["from_the_future"] = json!({"landmarks": [1, 2, 3]});
+    case["volumes"][0]["note"] = json!("kept");
+    let path = cases::write_case(folder.path(), &case);
+    let picture = folder.path().join("p.png");
+    let args = ["render", text(&path), "--out", text(&picture), "--backend", "reference", "--size", "16x16"];
+    let outcome = osteotome(&args);
+    assert_eq!(outcome.code(), 0, "{}", outcome.stderr);
+    assert_eq!(open_rgb(&picture).dimensions(), (16, 16), "the size asked for");
+}
+
+#[test]
+fn a_compressed_volume_is_a_ktx2_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let volume = folder.path().join("v.nrrd");
+    cases::write_nrrd(&volume, [20, 12, 8], 1.0, |v| (v[0] * 50) as i16);
+    let out = folder.path().join("v.ktx2");
+    let outcome = osteotome(&["compress", text(&volume), "--format", "bc4", "--out", text(&out), "--stats"]);
+    assert!(outcome.json().is_object(), "the statistics are one object");
+    let bytes = std::fs::read(&out).unwrap();
+    assert_eq!(bytes[..12], *b"\xABKTX 20\xBB\r\n\x1A\n", "the identifier of KTX 2.0");
+    // Khronos KTX 2.0, 3: vkFormat, typeSize, pixelWidth, pixelHeight, pixelDepth as u32 from byte 12.
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    assert_eq!([word(20), word(24), word(28)], [20, 12, 8], "the extent");
+    assert!([139, 140].contains(&word(12)), "VK_FORMAT_BC4_UNORM_BLOCK or _SNORM_BLOCK: {}", word(12));
+    let threads = |n: &str| {
+        let out = folder.path().join(n);
+        let args = ["compress", text(&volume), "--format", "bc4", "--out", text(&out), "--threads", n];
+        assert_eq!(osteotome(&args).code(), 0, "{n} threads");
+        std::fs::read(out).unwrap()
+    };
+    assert!(threads("1") == threads("4"), "the bytes do not depend on the number of threads");
+}

@@ -1,0 +1,56 @@
+//! The window: starts without a screen, draws, and closes.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use crate::support::compare::{colours, open_rgb};
+use crate::support::display::Display;
+use crate::support::program::{PROGRAM, wait};
+use crate::support::{cases, gpu_wanted};
+
+/// Software rendering of every view, on a busy machine, with shaders compiled for the first time.
+const LIMIT: Duration = Duration::from_mins(5);
+
+fn screenshot_of(arguments: &[&str], folder: &Path) -> image::RgbImage {
+    let display = Display::start();
+    let picture = folder.join("window.png");
+    let log = folder.join("window.log");
+    let mut window = Command::new(PROGRAM)
+        .args(arguments)
+        .env("DISPLAY", &display.name)
+        .env("XDG_RUNTIME_DIR", folder)
+        .env("XDG_CACHE_HOME", folder.join("cache"))
+        .env("XDG_DATA_HOME", folder.join("data"))
+        .env("OSTEOTOME_SCREENSHOT", &picture)
+        .env_remove("WAYLAND_DISPLAY")
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(std::fs::File::create(&log).unwrap())
+        .spawn()
+        .unwrap();
+    let status = wait(&mut window, LIMIT);
+    let said = std::fs::read_to_string(&log).unwrap_or_default();
+    let status = status.unwrap_or_else(|| panic!("the window neither drew nor closed in {LIMIT:?}: {said}"));
+    assert!(status.success(), "the window closes cleanly after its screenshot: {status}: {said}");
+    open_rgb(&picture)
+}
+
+#[test]
+fn the_window_starts_on_a_case_draws_it_and_closes() {
+    if !gpu_wanted() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let case = cases::write_case(folder.path(), &cases::cut_ball(folder.path()));
+    let picture = screenshot_of(&[case.to_str().unwrap()], folder.path());
+    assert!(
+        picture.width() >= 800 && picture.height() >= 500,
+        "a window of a useful size: {:?}",
+        picture.dimensions()
+    );
+    assert!(colours(&picture) > 1000, "views and panels, not an empty window: {} colours", colours(&picture));
+    // The ball is orange and nothing of the program's own look is: if it is drawn, some pixels are clearly so.
+    let orange = picture.pixels().filter(|p| p.0[0] > 120 && p.0[0] > p.0[2].saturating_add(60)).count();
+    assert!(orange > 2000, "the volume's own colour is on screen: {orange} pixels");
+}
