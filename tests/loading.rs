@@ -37,7 +37,7 @@ const fn volume(
 }
 
 #[rustfmt::skip]
-const VOLUMES: [Volume; 18] = [
+const VOLUMES: [Volume; 20] = [
     volume("ct/chest_lidc0001.nii.gz", [512, 512, 133], [0.703125, 0.703125, 2.5], "LAS", [-166.0, 187.5969, -340.0], [-2048.0, 3071.0]),
     volume("ct/chest_lidc0001_labels.nii.gz", [512, 512, 133], [0.703125, 0.703125, 2.5], "LAS", [-166.0, 187.5969, -340.0], [0.0, 118.0]),
     volume("ct/cranium_256.nrrd", [256, 256, 108], [0.9570312, 0.9570312, 1.5], "LAS", [0.0; 3], [-1024.0, 2986.0]),
@@ -47,6 +47,10 @@ const VOLUMES: [Volume; 18] = [
     volume("ct/dicom_single/GE10_RLE.dcm", GE10, GE10_MM, "LPS, oblique", GE10_FIRST, GE10_RANGE),
     volume("ct/dicom_single/GE10_J2K.dcm", GE10, GE10_MM, "LPS, oblique", GE10_FIRST, GE10_RANGE),
     volume("ct/dicom_single/GE10_JLS.dcm", GE10, GE10_MM, "LPS, oblique", GE10_FIRST, GE10_RANGE),
+    // Turned back from white-is-least, it is the same slice again.
+    volume("ct/dicom_single/GE10_MONOCHROME1_inverted.dcm", GE10, GE10_MM, "LPS, oblique", GE10_FIRST, GE10_RANGE),
+    // Frame offsets of 5 mm; DoseGridScaling 1e-6 of 795 000 to 1 254 000.
+    volume("ct/dicom_single/rtdose_multiframe.dcm", [10, 10, 15], [10.0, 10.0, 5.0], "LPS", [189.43125, 199.43125, -761.87], [0.795, 1.254]),
     volume("mri/ch2_t1.nii.gz", [181, 217, 181], [1.0; 3], "RAS", [90.0, 125.0, -71.0], [0.0, 254.0]),
     volume("mri/ct_brain_atlas_1mm.nii.gz", [202, 202, 179], [1.0; 3], "RAS", [100.8027, -81.6973, 1126.8], [-30.0, 385.0]),
     volume("mri/torso_mr_3mm.nii.gz", [117, 91, 20], [3.0; 3], "LPS", [-168.5996, -166.3594, 28.9896], [-47.0, 833.0]),
@@ -150,11 +154,9 @@ fn a_tilted_gantry_and_uneven_slices_are_kept_right_and_said() {
         (last[0] + 125.0).abs() < 1e-3 && (last[1] + 123.54046).abs() < 1e-3,
         "slices are above each other: {last:?}"
     );
-    assert!((last[2] - 157.776).abs() < 7.5, "the last slice: {last:?}");
-    assert!(
-        near(&numbers(&item["range"]), &[-1500.0, 2121.0]) || numbers(&item["range"])[1] <= 2121.0,
-        "{item}"
-    );
+    // 1.081 mm is no whole part of the steps beside it: the resampled stack may end a little before the last slice.
+    assert!((last[2] - 157.776).abs() < 0.05, "the last slice: {last:?}");
+    assert!(near(&numbers(&item["range"]), &[-1500.0, 2121.0]), "{}", item["range"]);
 }
 
 #[test]

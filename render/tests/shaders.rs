@@ -1,5 +1,4 @@
 //! Every WGSL file is listed, is whole, and agrees with its Rust mirror.
-#![expect(clippy::unwrap_used, reason = "a test may fail loudly")]
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -54,10 +54,12 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-type Measured = (Vec<Map<String, Value>>, fn(&[Map<String, Value>]) -> Chart);
+/// What was measured of one thing.
+type Row = Map<String, Value>;
+type Measured = (Vec<Row>, fn(&[Row]) -> Chart);
 
 /// Prints a row as soon as it is measured, and keeps it.
-fn report(rows: &mut Vec<Map<String, Value>>, row: Value, json: bool) -> Result<(), Failure> {
+fn report(rows: &mut Vec<Row>, row: Value, json: bool) -> Result<(), Failure> {
     let Value::Object(row) = row else { return Ok(()) };
     if json {
         say(&Value::Object(row.clone()).to_string())?;
@@ -130,8 +132,8 @@ fn generate_ms(gpu: &Arc<Gpu>, scene: &Scene) -> Result<f64, Failure> {
     Ok(median(times))
 }
 
-fn frame_chart(rows: &[Map<String, Value>]) -> Chart {
-    let label = |row: &Map<String, Value>| format!("{} voxel", row["spacing_voxels"]);
+fn frame_chart(rows: &[Row]) -> Chart {
+    let label = |row: &Row| format!("{} voxel", row["spacing_voxels"]);
     Chart {
         title: "A frame of 512 x 512: time against error".to_owned(),
         x: "frame, ms".to_owned(),
@@ -182,8 +184,8 @@ fn thread_counts() -> Vec<usize> {
     if all > 1 { vec![1, all] } else { vec![1] }
 }
 
-fn compress_chart(rows: &[Map<String, Value>]) -> Chart {
-    let label = |row: &Map<String, Value>| format!("{} threads", row["threads"]);
+fn compress_chart(rows: &[Row]) -> Chart {
+    let label = |row: &Row| format!("{} threads", row["threads"]);
     Chart {
         title: "Textures: time against error".to_owned(),
         x: "encoding, ms".to_owned(),
@@ -192,16 +194,12 @@ fn compress_chart(rows: &[Map<String, Value>]) -> Chart {
     }
 }
 
-fn number(row: &Map<String, Value>, key: &str) -> f64 {
+fn number(row: &Row, key: &str) -> f64 {
     row.get(key).and_then(Value::as_f64).unwrap_or(f64::NAN)
 }
 
 /// Rows with one value of `key` are one series.
-fn series(
-    rows: &[Map<String, Value>],
-    key: &str,
-    point: &dyn Fn(&Map<String, Value>) -> (f64, f64, String),
-) -> Vec<Series> {
+fn series(rows: &[Row], key: &str, point: &dyn Fn(&Row) -> (f64, f64, String)) -> Vec<Series> {
     let mut all: Vec<Series> = Vec::new();
     for row in rows {
         let name = row.get(key).and_then(Value::as_str).unwrap_or_default();

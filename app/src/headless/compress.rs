@@ -152,8 +152,8 @@ pub(super) fn volume<'a>(
     assets: &'a Assets,
     path: &std::path::Path,
 ) -> Result<(&'a Volume, &'a Arc<Grid>), Failure> {
-    let visible = case.volumes.iter().filter(|v| v.visible);
-    visible.filter_map(|v| Some((v, assets.grid(v)?))).next().ok_or_else(|| {
+    let mut visible = case.volumes.iter().filter(|v| v.visible);
+    visible.find_map(|v| Some((v, assets.grid(v)?))).ok_or_else(|| {
         let fault = "there is no volume to take; choose a file with a volume, or make one visible";
         Failure::Unfit(format!("{fault}: {}", path.display()))
     })

@@ -1,6 +1,5 @@
 //! `info`: what is in files, folders, archives and cases.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use ::render::volume::cells::{CellKind, Field, Place};
@@ -26,7 +25,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         if !args.json {
             say(&format!("{}: {}", path.display(), counted(items.len(), "item")))?;
             for item in &items {
-                say(text(item).trim_end())?;
+                say(&text(item))?;
             }
         }
         all.extend(items);
@@ -166,36 +165,24 @@ fn orientation(world_from_voxel: &Affine) -> String {
 
 /// An item for people: a line of what it is, and indented lines of its figures and notes.
 fn text(item: &Value) -> String {
-    let mut out = String::new();
     let word = |key: &str| item[key].as_str().unwrap_or_default();
-    let mut head = format!("  {} \"{}\", {}", word("kind"), word("name"), word("format"));
-    if let Some(modality) = item["modality"].as_str() {
-        head.push_str(&format!(", {modality}"));
-    }
-    out.push_str(&head);
-    out.push('\n');
-    let Value::Object(map) = item else { return out };
-    for (key, value) in map {
+    let modality = item["modality"].as_str().map_or_else(String::new, |m| format!(", {m}"));
+    let mut lines = vec![format!("  {} \"{}\", {}{modality}", word("kind"), word("name"), word("format"))];
+    let said = ["kind", "name", "format", "modality", "path", "notes"];
+    let figures = item.as_object().into_iter().flatten().filter(|(key, _)| !said.contains(&key.as_str()));
+    for (key, value) in figures {
         let value = match value {
-            _ if matches!(key.as_str(), "kind" | "name" | "format" | "modality" | "path" | "notes") => {
-                continue;
-            }
             Value::String(text) => text.clone(),
             Value::Array(list) if list.len() > 16 => format!("{} of them", list.len()),
             other => other.to_string(),
         };
-        line(&mut out, key, &value);
+        lines.push(format!("    {key}: {value}"));
     }
     for note in item["notes"].as_array().into_iter().flatten() {
         let part = |key: &str| note[key].as_str().unwrap_or_default();
-        line(&mut out, part("severity"), &format!("{} [{}]", part("text"), part("code")));
+        lines.push(format!("    {}: {} [{}]", part("severity"), part("text"), part("code")));
     }
-    out
-}
-
-fn line(out: &mut String, key: &str, value: &str) {
-    // Writing to a string cannot fail.
-    drop(writeln!(out, "    {key}: {value}"));
+    lines.join("\n")
 }
 
 fn counted(count: usize, thing: &str) -> String {

@@ -70,8 +70,11 @@ impl Failure {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
-            Self::Case(_) | Self::Data(_) | Self::Unfit(_) => 3,
-            Self::Gpu(GpuError::Camera(_)) | Self::Reference(ReferenceError::Camera(_)) => 3,
+            Self::Case(_)
+            | Self::Data(_)
+            | Self::Unfit(_)
+            | Self::Gpu(GpuError::Camera(_))
+            | Self::Reference(ReferenceError::Camera(_)) => 3,
             Self::Gpu(GpuError::NoAdapter { .. } | GpuError::NoDevice { .. }) => 4,
             _ => 1,
         }

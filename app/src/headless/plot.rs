@@ -1,7 +1,5 @@
 //! Small SVG charts: points of one or more series over two axes, one of which may be logarithmic.
 
-use std::fmt::Write as _;
-
 /// Points of one colour and name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
@@ -37,65 +35,60 @@ impl Chart {
         let finite = |p: &&(f64, f64, String)| p.0 > 0.0 && p.0.is_finite() && p.1.is_finite();
         let all: Vec<&(f64, f64, String)> =
             self.series.iter().flat_map(|s| &s.points).filter(finite).collect();
-        let decade =
-            |pick: fn(f64, f64) -> f64, start: f64| all.iter().map(|p| p.0.log10()).fold(start, pick);
-        let (low, high) =
-            (decade(f64::min, f64::INFINITY).floor(), decade(f64::max, f64::NEG_INFINITY).ceil());
-        let (low, high) = if low < high { (low, high) } else { (low.min(0.0).max(-9.0), low.max(0.0) + 1.0) };
+        let powers = all.iter().map(|p| p.0.log10());
+        let low = powers.clone().fold(f64::INFINITY, f64::min).floor();
+        let high = powers.fold(f64::NEG_INFINITY, f64::max).ceil();
+        // Without points there is a decade all the same, and with one value the one above it.
+        let [low, high] = if low > high { [0.0, 1.0] } else { [low, high.max(low + 1.0)] };
         let top = all.iter().map(|p| p.1).fold(1.0, f64::max) * 1.08;
         let [left, upper, right, lower] = FRAME;
         let x = |v: f64| left + (v.log10() - low) / (high - low) * (right - left);
         let y = |v: f64| lower - v / top * (lower - upper);
 
-        let mut out = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
-             viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" font-size=\"12\">\n\
-             <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
-             <rect x=\"{left}\" y=\"{upper}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888\"/>\n",
-            right - left,
-            lower - upper
-        );
-        let mut text = |at: [f64; 2], anchor: &str, what: &str| {
-            // Writing to a string cannot fail.
-            drop(writeln!(
-                out,
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
-                at[0],
-                at[1],
-                escaped(what)
-            ));
-        };
-        text([WIDTH / 2.0, 24.0], "middle", &self.title);
-        text([f64::midpoint(left, right), lower + 36.0], "middle", &self.x);
-        text([8.0, upper - 10.0], "start", &self.y);
+        let mut lines = vec![
+            format!(
+                "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
+                 viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" font-size=\"12\">"
+            ),
+            "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>".to_owned(),
+            format!(
+                "<rect x=\"{left}\" y=\"{upper}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888\"/>",
+                right - left,
+                lower - upper
+            ),
+            text([WIDTH / 2.0, 24.0], "middle", &self.title),
+            text([f64::midpoint(left, right), lower + 36.0], "middle", &self.x),
+            text([8.0, upper - 10.0], "start", &self.y),
+        ];
         for power in low as i32..=high as i32 {
             let value = 10.0_f64.powi(power);
-            text([x(value), lower + 18.0], "middle", &value.to_string());
+            lines.push(text([x(value), lower + 18.0], "middle", &value.to_string()));
         }
         for tick in 0..=4 {
             let value = top * f64::from(tick) / 4.0;
-            text([left - 6.0, y(value) + 4.0], "end", &format!("{value:.1}"));
-        }
-        for (i, series) in self.series.iter().enumerate() {
-            let at = [right + 28.0, upper + 14.0 + 20.0 * i as f64];
-            text(at, "start", &series.name);
-            for point in series.points.iter().filter(finite) {
-                text([x(point.0) + 7.0, y(point.1) - 5.0], "start", &point.2);
-            }
+            lines.push(text([left - 6.0, y(value) + 4.0], "end", &format!("{value:.1}")));
         }
         for (i, series) in self.series.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
-            let mut dot = |cx: f64, cy: f64| {
-                drop(writeln!(out, "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"4.5\" fill=\"{colour}\"/>"));
-            };
-            dot(right + 18.0, upper + 10.0 + 20.0 * i as f64);
-            for point in series.points.iter().filter(finite) {
-                dot(x(point.0), y(point.1));
+            let row = upper + 10.0 + 20.0 * i as f64;
+            lines.push(dot([right + 18.0, row], colour));
+            lines.push(text([right + 28.0, row + 4.0], "start", &series.name));
+            for (px, py, label) in series.points.iter().filter(finite) {
+                lines.push(dot([x(*px), y(*py)], colour));
+                lines.push(text([x(*px) + 7.0, y(*py) - 5.0], "start", label));
             }
         }
-        out.push_str("</svg>\n");
-        out
+        lines.push("</svg>\n".to_owned());
+        lines.join("\n")
     }
+}
+
+fn dot([x, y]: [f64; 2], colour: &str) -> String {
+    format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4.5\" fill=\"{colour}\"/>")
+}
+
+fn text([x, y]: [f64; 2], anchor: &str, what: &str) -> String {
+    format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>", escaped(what))
 }
 
 fn escaped(text: &str) -> String {

@@ -190,7 +190,7 @@ impl Host {
         self.problems_ui(ui);
         Panel::bottom("status").show(ui, |ui| self.status_ui(ui));
         Panel::left("tools")
-            .default_size(350.0)
+            .default_size(385.0)
             .size_range(300.0..=560.0)
             .show(ui, |ui| self.tools_ui(ui, &mut wishes));
         let stage = Frame::new().fill(theme::STAGE);
@@ -376,10 +376,10 @@ impl Host {
             context.is_captured()
         };
         let answer = self.spatial.ui(ui, rect, &input, &mut pass_on);
-        self.answer(answer, scene, ball, wishes);
+        self.answer(&answer, scene, ball, wishes);
     }
 
-    fn answer(&mut self, answer: SpatialAnswer, scene: &Scene, ball: Ball, wishes: &mut Wishes) {
+    fn answer(&mut self, answer: &SpatialAnswer, scene: &Scene, ball: Ball, wishes: &mut Wishes) {
         if let Some(camera) = answer.camera {
             wishes.edits.push(Edit::SetCamera(Some(camera)));
         }
@@ -501,7 +501,7 @@ impl Host {
         match Dialog::open(question, Arc::clone(&self.wake)) {
             Ok(dialog) => self.dialog = Some(dialog),
             Err(error) => {
-                self.session.complain(format!("no file dialog ({error}); drop the file on the window"))
+                self.session.complain(format!("no file dialog ({error}); drop the file on the window"));
             }
         }
     }

@@ -32,20 +32,30 @@ const PROGRAM: [[&str; 2]; 4] = [
 
 /// Draws the page while `open`.
 pub fn help_ui(ctx: &Context, open: &mut bool) {
-    Window::new("Pointer and keys").open(open).resizable(false).collapsible(false).show(ctx, |ui| {
-        for (title, rows) in
-            [("In the 3D view", SPATIAL.as_slice()), ("In a section", &SECTIONS), ("Everywhere", &PROGRAM)]
-        {
-            theme::section_ui(ui, title);
-            Grid::new(title).num_columns(2).show(ui, |ui| {
-                for [keys, does] in rows {
-                    ui.monospace(*keys);
-                    ui.label(*does);
-                    ui.end_row();
-                }
-            });
-        }
-        ui.add_space(6.0);
-        theme::quiet_ui(ui, "Sections and values are sampled from the data as loaded, never from a texture.");
-    });
+    Window::new("Pointer and keys")
+        .open(open)
+        .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO)
+        .resizable(false)
+        .collapsible(false)
+        .show(ctx, |ui| {
+            for (title, rows) in [
+                ("In the 3D view", SPATIAL.as_slice()),
+                ("In a section", &SECTIONS),
+                ("Everywhere", &PROGRAM),
+            ] {
+                theme::section_ui(ui, title);
+                Grid::new(title).num_columns(2).show(ui, |ui| {
+                    for [keys, does] in rows {
+                        ui.monospace(*keys);
+                        ui.label(*does);
+                        ui.end_row();
+                    }
+                });
+            }
+            ui.add_space(6.0);
+            theme::quiet_ui(
+                ui,
+                "Sections and values are sampled from the data as loaded, never from a texture.",
+            );
+        });
 }

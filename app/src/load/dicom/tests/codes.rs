@@ -104,9 +104,8 @@ fn a_codec_that_is_not_read_is_named_with_a_remedy() {
 #[test]
 fn floating_point_pixels_are_kept() {
     let pixels: Vec<u8> = (0..12).flat_map(|i| (i as f32 * 0.1).to_le_bytes()).collect();
-    let slice =
+    let mut slice =
         Slice::new([0.0; 3], &[0; 12]).without(0x7FE0_0010).with((0x7FE0_0008, "OF", Value::Bytes(pixels)));
-    let mut slice = slice;
     if let Some((_, _, Value::Bytes(bytes))) = slice.elements.last_mut() {
         bytes[4..8].copy_from_slice(&f32::NAN.to_le_bytes());
     }

@@ -1,0 +1,381 @@
+//! The GPU's picture against the `f64` reference, for every pairing of volumes, cuts, surfaces and cameras.
+
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+
+use render::gpu::{Gpu, GpuError};
+use render::image::FloatImage;
+use render::reference;
+use render::renderer::{Quality, Renderer, Stats};
+use render::scene::{
+    Camera, MeshItem, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem,
+};
+use render::volume::{
+    Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Side, Transfer, TriangleMesh, Vector, synth,
+};
+
+const SIZE: [u32; 2] = [96, 80];
+
+/// One device for all tests. No adapter is a failure, not a skip, unless `NO_GPU=1` says so.
+static RENDERER: LazyLock<Result<Mutex<Renderer>, GpuError>> =
+    LazyLock::new(|| Renderer::new(Arc::new(Gpu::headless()?)).map(Mutex::new));
+
+fn draw(scene: &Scene, quality: Quality) -> Option<(FloatImage, Stats)> {
+    draw_sized(scene, SIZE, quality)
+}
+
+fn draw_sized(scene: &Scene, size: [u32; 2], quality: Quality) -> Option<(FloatImage, Stats)> {
+    if std::env::var_os("NO_GPU").is_some_and(|v| v == "1") {
+        return None;
+    }
+    let mut renderer =
+        RENDERER.as_ref().map_err(Clone::clone).unwrap().lock().unwrap_or_else(PoisonError::into_inner);
+    let stats = renderer.render(scene, size, quality).unwrap();
+    Some((renderer.read().unwrap(), stats))
+}
+
+fn truth(scene: &Scene) -> FloatImage {
+    reference::draw(scene, SIZE, &reference::Options::default(), &|_, _| true).unwrap()
+}
+
+/// Draws with both and holds the difference under bounds; returns what the GPU did.
+fn agrees(scene: &Scene, what: &str, psnr_db: f64, max: f64) -> Stats {
+    let truth = truth(scene);
+    let Some((picture, stats)) = draw(scene, Quality::Finest) else { return Stats::default() };
+    let d = picture.difference(&truth, scene.background).unwrap();
+    assert!(d.psnr_db >= psnr_db && d.max <= max, "{what}: {d:?}");
+    let lit = truth.pixels.iter().filter(|p| p[3] > 0.1).count();
+    assert!(lit > 200, "{what}: only {lit} pixels show anything");
+    stats
+}
+
+fn point(value: f64, r: f64, g: f64, b: f64, a: f64) -> ControlPoint {
+    ControlPoint { value, rgba: [r, g, b, a] }
+}
+
+/// Bone-like: clear outside, a soft rim, a dense core.
+fn bone() -> Arc<Transfer> {
+    let points = vec![
+        point(-1000.0, 0.8, 0.3, 0.2, 0.0),
+        point(0.0, 0.8, 0.3, 0.2, 0.0),
+        point(300.0, 0.9, 0.6, 0.4, 0.05),
+        point(700.0, 1.0, 0.95, 0.8, 0.5),
+    ];
+    Arc::new(Transfer::new(points, 1.0).unwrap())
+}
+
+/// A ball and a rod with a smooth rim, as whole HU, in a grid that is neither cubic nor axis-parallel.
+fn grid() -> Arc<Grid> {
+    let turn = Affine::rotation_about(Point::origin(), Vector::new(0.3, 1.0, 0.2), 0.4);
+    let spacing =
+        Affine::from_columns(Vector::x(), Vector::y() * 1.25, Vector::z() * 1.5, Point::origin()).unwrap();
+    let place = turn * spacing * Affine::translation(Vector::new(-23.5, -19.5, -15.5));
+    let value = |p: &Point| {
+        let ball = 14.0 - (p - Point::new(-4.0, 2.0, 5.0)).norm();
+        let rod = 6.0 - (p.x - 3.0).hypot(p.y + 3.0);
+        (ball.max(rod) * 120.0).clamp(-1000.0, 1200.0).round()
+    };
+    let float = synth::from_places([48, 40, 32], place, value).unwrap();
+    let whole = (0..48 * 40 * 32).map(|i| float.value_at(i) as i16).collect();
+    Arc::new(Grid::new([48, 40, 32], Samples::I16(whole), Rescale::default(), place).unwrap())
+}
+
+fn volume(texture: TextureFormat) -> VolumeItem {
+    VolumeItem {
+        grid: grid(),
+        pose: Affine::identity(),
+        transfer: bone(),
+        shading: Shading::None,
+        texture,
+        pieces: vec![Piece::whole()],
+    }
+}
+
+fn perspective() -> Camera {
+    Camera {
+        eye: Point::new(60.0, -120.0, 50.0),
+        target: Point::origin(),
+        up: Vector::z(),
+        projection: Projection::Perspective { fov_rad: 0.45 },
+    }
+}
+
+fn parallel() -> Camera {
+    Camera { projection: Projection::Parallel { height_mm: 62.0 }, ..perspective() }
+}
+
+fn scene(volumes: Vec<VolumeItem>, meshes: Vec<MeshItem>) -> Scene {
+    Scene { volumes, meshes, camera: perspective(), background: [0.1, 0.2, 0.3] }
+}
+
+/// A closed box as a mesh.
+fn block(centre: [f64; 3], half: f64, color: [f64; 3], opacity: f64) -> MeshItem {
+    let corner = |i: usize| {
+        Point::from([0, 1, 2].map(|a| centre[a] + if i >> a & 1 == 1 { half } else { -half }))
+    };
+    let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = sides.iter().flat_map(|s| [[s[0], s[1], s[2]], [s[0], s[2], s[3]]]).collect();
+    MeshItem {
+        mesh: Arc::new(TriangleMesh::new((0..8).map(corner).collect(), triangles).unwrap()),
+        pose: Affine::rotation_about(Point::origin(), Vector::new(0.2, 0.5, 1.0), 0.6),
+        color,
+        opacity,
+        shading: Shading::None,
+    }
+}
+
+fn plane(at: [f64; 3], normal: [f64; 3]) -> Cutter {
+    Cutter::plane(Point::from(at), Vector::from(normal)).unwrap()
+}
+
+/// The pieces that two crossing planes make, each with its own pose.
+fn pieces(poses: [Affine; 3]) -> Vec<Piece> {
+    let (a, b) = (plane([0.0, 0.0, 2.0], [0.3, 0.2, 1.0]), plane([2.0, 0.0, 0.0], [1.0, 0.4, -0.3]));
+    let keeps = [
+        vec![(a, Side::Plus)],
+        vec![(a, Side::Minus), (b, Side::Plus)],
+        vec![(a, Side::Minus), (b, Side::Minus)],
+    ];
+    keeps.into_iter().zip(poses).map(|(keep, pose)| Piece { keep, pose }).collect()
+}
+
+#[test]
+fn a_plain_volume_in_both_cameras() {
+    let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
+    let stats = agrees(&s, "perspective", 60.0, 2.0);
+    assert!(stats.bricks_skipped > 0 || stats.bricks == 0, "some bricks are clear: {stats:?}");
+    s.camera = parallel();
+    agrees(&s, "parallel", 60.0, 2.0);
+    s.volumes[0].texture = TextureFormat::R32f;
+    agrees(&s, "float texture", 60.0, 2.0);
+}
+
+#[test]
+fn a_lit_volume() {
+    let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
+    s.volumes[0].shading = Shading::Lit;
+    agrees(&s, "lit", 50.0, 6.0);
+}
+
+#[test]
+fn two_volumes_that_overlap() {
+    let mut other = volume(TextureFormat::R16);
+    other.pose = Affine::rotation_about(Point::origin(), Vector::new(1.0, 0.2, 0.1), 1.1)
+        * Affine::translation(Vector::new(6.0, -3.0, 2.0));
+    let points = vec![point(-200.0, 0.1, 0.4, 0.9, 0.0), point(600.0, 0.3, 0.9, 1.0, 0.12)];
+    other.transfer = Arc::new(Transfer::new(points, 2.0).unwrap());
+    let stats = agrees(&scene(vec![volume(TextureFormat::R16), other], vec![]), "overlap", 60.0, 2.0);
+    assert!(stats.most_overlapping == 2 || stats.draws == 0, "they are integrated together: {stats:?}");
+}
+
+#[test]
+fn a_volume_cut_and_left_in_place_is_the_whole() {
+    let whole = scene(vec![volume(TextureFormat::R16)], vec![]);
+    let mut cut = whole.clone();
+    cut.volumes[0].pieces = pieces([Affine::identity(); 3]);
+    agrees(&cut, "cut in place", 60.0, 2.0);
+    let (Some((a, _)), Some((b, _))) = (draw(&whole, Quality::Good), draw(&cut, Quality::Good)) else { return };
+    let d = a.difference(&b, whole.background).unwrap();
+    // Where a cut splits a sub-step it is integrated in two parts, which is finer.
+    assert!(d.psnr_db > 55.0 && d.max < 4.0, "{d:?}");
+}
+
+#[test]
+fn fragments_that_moved_and_overlap() {
+    let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
+    let turn = Affine::rotation_about(Point::origin(), Vector::new(0.1, 0.3, 1.0), 0.5);
+    s.volumes[0].pieces = pieces([
+        Affine::translation(Vector::new(3.0, -2.0, 9.0)) * turn,
+        Affine::translation(Vector::new(-5.0, 1.0, 2.0)),
+        turn,
+    ]);
+    agrees(&s, "moved fragments", 58.0, 3.0);
+    s.camera = parallel();
+    agrees(&s, "moved fragments, parallel", 58.0, 3.0);
+}
+
+#[test]
+fn cylinders_keep_their_inside_and_their_outside() {
+    let tube = Cutter::cylinder(Point::new(-2.0, 0.0, 4.0), Vector::new(0.2, 1.0, 0.3), 9.0).unwrap();
+    for side in [Side::Plus, Side::Minus] {
+        let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
+        s.volumes[0].pieces = vec![Piece { keep: vec![(tube, side)], pose: Affine::identity() }];
+        agrees(&s, "cylinder", 55.0, 4.0);
+    }
+    let whole = scene(vec![volume(TextureFormat::R16)], vec![]);
+    let mut both = whole.clone();
+    both.volumes[0].pieces =
+        [Side::Plus, Side::Minus].map(|side| Piece { keep: vec![(tube, side)], pose: Affine::identity() }).into();
+    agrees(&both, "both sides of a cylinder", 55.0, 4.0);
+}
+
+#[test]
+fn a_translucent_surface_before_inside_across_and_behind() {
+    for (what, centre, half) in [
+        ("before", [20.0, -40.0, 12.0], 6.0),
+        ("inside", [-4.0, 2.0, 5.0], 5.0),
+        ("across", [2.0, -8.0, 4.0], 12.0),
+        ("behind", [-20.0, 40.0, -12.0], 14.0),
+    ] {
+        let mut s = scene(vec![volume(TextureFormat::R16)], vec![block(centre, half, [0.2, 0.6, 1.0], 0.4)]);
+        agrees(&s, what, 60.0, 2.5);
+        s.camera = parallel();
+        s.meshes[0].shading = Shading::Lit;
+        agrees(&s, what, 60.0, 2.5);
+        s.meshes[0].opacity = 1.0;
+        agrees(&s, what, 60.0, 2.5);
+    }
+}
+
+#[test]
+fn surfaces_that_cross_each_other_inside_a_cut_volume() {
+    let mut s = scene(
+        vec![volume(TextureFormat::R16)],
+        vec![
+            block([0.0, 0.0, 0.0], 11.0, [0.2, 0.6, 1.0], 0.3),
+            block([5.0, -4.0, 3.0], 9.0, [1.0, 0.2, 0.3], 0.5),
+            block([-9.0, 3.0, -6.0], 7.0, [0.3, 1.0, 0.3], 1.0),
+        ],
+    );
+    s.volumes[0].pieces = pieces([
+        Affine::translation(Vector::new(0.0, 0.0, 4.0)),
+        Affine::identity(),
+        Affine::translation(Vector::new(-3.0, 0.0, 0.0)),
+    ]);
+    let stats = agrees(&s, "crossing surfaces", 58.0, 3.0);
+    assert!(stats.layers > 0 || stats.draws == 0, "translucent crossings were captured");
+    s.volumes.clear();
+    let d = agrees(&s, "surfaces alone", 100.0, 0.01);
+    assert_eq!(d.textures.len(), 0, "no volume, no texture");
+}
+
+#[test]
+fn more_fragments_than_slots_meet() {
+    let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
+    let cutters: Vec<Cutter> =
+        (0..9).map(|i| plane([0.0, 0.0, f64::from(i) * 4.0 - 18.0], [0.2, 0.1, 1.0])).collect();
+    s.volumes[0].pieces = (0..=9)
+        .map(|i| {
+            let mut keep = Vec::new();
+            if i > 0 {
+                keep.push((cutters[i - 1], Side::Plus));
+            }
+            if i < 9 {
+                keep.push((cutters[i], Side::Minus));
+            }
+            Piece { keep, pose: Affine::identity() }
+        })
+        .collect();
+    agrees(&s, "ten fragments", 58.0, 3.0);
+}
+
+#[test]
+fn the_eye_may_be_inside_the_volume_or_look_along_up() {
+    let mut s = scene(vec![volume(TextureFormat::R16)], vec![block([0.0; 3], 9.0, [0.2, 0.6, 1.0], 0.4)]);
+    s.camera.eye = Point::new(6.0, -14.0, 6.0);
+    s.camera.projection = Projection::Perspective { fov_rad: 1.2 };
+    agrees(&s, "eye inside", 58.0, 3.0);
+    s.camera = Camera { eye: Point::new(0.0, 0.0, 90.0), ..perspective() };
+    agrees(&s, "up along the view", 60.0, 2.0);
+}
+
+#[test]
+fn lossy_textures_state_their_error_and_stay_near() {
+    for (format, psnr_db) in
+        [(TextureFormat::Bc4, 45.0), (TextureFormat::Rgba8, 30.0), (TextureFormat::Bc3, 28.0)]
+    {
+        let s = scene(vec![volume(format)], vec![]);
+        let stats = agrees(&s, "lossy texture", psnr_db, 128.0);
+        for t in &stats.textures {
+            assert_eq!(t.format, format, "no fall-back is needed here");
+            assert!(t.max_error > 0.0 && t.psnr_db.is_finite(), "the error is stated: {t:?}");
+        }
+    }
+}
+
+#[test]
+fn a_scene_far_from_the_origin_gives_the_same_picture() {
+    let mut s = scene(vec![volume(TextureFormat::R16)], vec![block([2.0, -8.0, 4.0], 9.0, [0.2, 0.6, 1.0], 0.4)]);
+    s.volumes[0].pieces = pieces([Affine::identity(); 3]);
+    let near = draw(&s, Quality::Good);
+    let far = Vector::new(1e6, -1e6, 1e6);
+    let shift = Affine::translation(far);
+    s.volumes[0].pose = shift * s.volumes[0].pose;
+    for piece in &mut s.volumes[0].pieces {
+        for (cutter, _) in &mut piece.keep {
+            if let Cutter::Plane { point, .. } = cutter {
+                *point += far;
+            }
+        }
+    }
+    s.meshes[0].pose = shift * s.meshes[0].pose;
+    s.camera.eye += far;
+    s.camera.target += far;
+    let (Some((a, _)), Some((b, _))) = (near, draw(&s, Quality::Good)) else { return };
+    let d = a.difference(&b, s.background).unwrap();
+    assert!(d.max <= 1.0, "{d:?}");
+}
+
+#[test]
+fn the_error_falls_with_the_square_of_the_spacing() {
+    let s = scene(vec![volume(TextureFormat::R16)], vec![]);
+    let truth = truth(&s);
+    let error = |voxels| {
+        let (picture, _) = draw(&s, Quality::Spacing(voxels))?;
+        Some(picture.difference(&truth, s.background).unwrap().mean)
+    };
+    let (Some(coarse), Some(fine)) = (error(1.0), error(0.25)) else { return };
+    let order = (coarse / fine).log2() / 2.0;
+    assert!(order > 1.8, "order {order}: mean error {coarse} at 1 voxel, {fine} at a quarter");
+}
+
+#[test]
+fn thousands_of_faint_slices_keep_their_sum() {
+    // 2048 sub-steps through a slab that lets e⁻¹ through in all.
+    let grid = synth::homogeneous([16, 16, 16], 1.0, Affine::translation(Vector::repeat(-7.5))).unwrap();
+    let opacity = -(-1.0_f64 / 16.0).exp_m1();
+    let transfer = Transfer::new(vec![point(0.0, 1.0, 0.5, 0.25, opacity), point(2.0, 1.0, 0.5, 0.25, opacity)], 1.0);
+    let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
+    s.volumes[0].grid = Arc::new(grid);
+    s.volumes[0].transfer = Arc::new(transfer.unwrap());
+    s.camera = Camera {
+        eye: Point::new(0.0, -40.0, 0.0),
+        projection: Projection::Parallel { height_mm: 12.0 },
+        ..perspective()
+    };
+    let Some((picture, stats)) = draw(&s, Quality::Spacing(1.0 / 128.0)) else { return };
+    assert!(stats.slabs * stats.steps_per_slab >= 2048, "{stats:?}");
+    let worst = picture
+        .pixels
+        .iter()
+        .map(|p| (f64::from(p[3]) - (1.0 - (-1.0_f64).exp())).abs() * 255.0)
+        .fold(0.0, f64::max);
+    assert!(worst <= 0.25, "off by {worst}/255");
+}
+
+#[test]
+fn what_is_hidden_or_clear_makes_no_texture() {
+    let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
+    s.volumes[0].transfer = Arc::new(Transfer::new(vec![point(0.0, 1.0, 1.0, 1.0, 0.0)], 1.0).unwrap());
+    let Some((picture, stats)) = draw(&s, Quality::Good) else { return };
+    assert!(stats.textures.is_empty() && stats.fragments_skipped == 1, "{stats:?}");
+    assert!(picture.pixels.iter().all(|p| *p == [0.0; 4]), "nothing is drawn");
+    s.volumes[0].pieces.clear();
+    let Some((_, stats)) = draw(&s, Quality::Good) else { return };
+    assert!(stats.textures.is_empty() && stats.bricks == 0, "{stats:?}");
+}
+
+#[test]
+fn pictures_that_cannot_be_are_errors() {
+    let s = scene(vec![volume(TextureFormat::R16)], vec![]);
+    let Some((one, _)) = draw_sized(&s, [1, 1], Quality::Good) else { return };
+    assert_eq!(one.pixels.len(), 1, "one pixel is a picture");
+    let mut renderer =
+        RENDERER.as_ref().map_err(Clone::clone).unwrap().lock().unwrap_or_else(PoisonError::into_inner);
+    let empty = renderer.render(&s, [0, 5], Quality::Good);
+    assert_eq!(empty, Err(GpuError::EmptyPicture { width: 0, height: 5 }), "no pixels");
+    let huge = renderer.render(&s, [1 << 20, 5], Quality::Good);
+    assert!(matches!(huge, Err(GpuError::TooLarge { .. })), "{huge:?}");
+    let mut blind = s;
+    blind.camera.target = blind.camera.eye;
+    assert!(matches!(renderer.render(&blind, SIZE, Quality::Good), Err(GpuError::Camera(_))), "no direction");
+}
