@@ -165,14 +165,8 @@ impl Gathered {
                 continue;
             };
             self.counts.fragments += 1;
-            let plan = Plan::new(
-                &item.grid,
-                &item.transfer,
-                item.texture,
-                bounds,
-                gpu.caps(),
-                &mut self.notes,
-            );
+            let plan =
+                Plan::new(&item.grid, &item.transfer, item.texture, bounds, gpu.caps(), &mut self.notes);
             let texture = textures.get(gpu, &plan)?;
             let kind = match (is_colour(texture.key.format), item.shading) {
                 (true, Shading::None) => Kind::Color,
@@ -216,8 +210,7 @@ impl Gathered {
         let near = spacing.near_mm;
         let (mut fragments, mut planes, mut cylinders) = (Vec::new(), Vec::new(), Vec::new());
         for fragment in &self.fragments {
-            let texture_from_view =
-                fragment.texture.texture_from_voxel * fragment.view_from_voxel.inverse();
+            let texture_from_view = fragment.texture.texture_from_voxel * fragment.view_from_voxel.inverse();
             let row = |r| view.row_form(&texture_from_view, r, near);
             let (plane_first, cylinder_first) = (planes.len() as u32, cylinders.len() as u32);
             planes.extend(fragment.planes.iter().map(|p| view.form(p, near)));
@@ -281,11 +274,7 @@ fn box_planes(low: Point, high: Point, view_from_voxel: &Affine) -> Vec<HalfSpac
 /// The same half-space with a normal of length 1, so that its value is in mm.
 fn unit(half: HalfSpace) -> HalfSpace {
     let length = half.normal.norm();
-    if length > 0.0 {
-        HalfSpace { normal: half.normal / length, offset: half.offset / length }
-    } else {
-        half
-    }
+    if length > 0.0 { HalfSpace { normal: half.normal / length, offset: half.offset / length } } else { half }
 }
 
 /// Two directions at right angles to `axis` and to each other, of length 1.

@@ -41,9 +41,8 @@ impl FloatImage {
 
     /// Display colour of every pixel over a background, not rounded; 0 to 1.
     pub fn over(&self, background: [f64; 3]) -> Vec<[f64; 3]> {
-        let through = |p: &[f32; 4]| {
-            std::array::from_fn(|c| f64::from(p[c]) + (1.0 - f64::from(p[3])) * background[c])
-        };
+        let through =
+            |p: &[f32; 4]| std::array::from_fn(|c| f64::from(p[c]) + (1.0 - f64::from(p[3])) * background[c]);
         self.pixels.iter().map(through).collect()
     }
 
@@ -73,7 +72,8 @@ impl FloatImage {
             }
         }
         let count = (self.pixels.len() * 3) as f64;
-        let psnr_db = if square == 0.0 { f64::INFINITY } else { 10.0 * (255.0 * 255.0 * count / square).log10() };
+        let psnr_db =
+            if square == 0.0 { f64::INFINITY } else { 10.0 * (255.0 * 255.0 * count / square).log10() };
         Ok(Difference { psnr_db, max, mean: sum / count })
     }
 }

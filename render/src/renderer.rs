@@ -153,7 +153,8 @@ impl Renderer {
         let alone = (depth(1, f64::NEG_INFINITY, f64::max) - depth(0, f64::INFINITY, f64::min)) / 64.0;
         let step_mm = step_mm.unwrap_or_else(|| alone.max(1e-6));
         let spacing = Spacing::new(&gathered.members, step_mm, STEPS);
-        let target = self.target.as_ref().ok_or(GpuError::EmptyPicture { width: size[0], height: size[1] })?;
+        let target =
+            self.target.as_ref().ok_or(GpuError::EmptyPicture { width: size[0], height: size[1] })?;
         let spacing_or_none = spacing.unwrap_or(Spacing { near_mm: 0.0, step_mm, steps: STEPS, slabs: 1 });
         let frame = frame_data(scene, &view, &spacing_or_none);
 
@@ -183,7 +184,7 @@ impl Renderer {
             stats.most_overlapping = stack.most_overlapping as u32;
             let most = gpu.caps().storage_bytes;
             let width = u64::from(size[0]);
-            let mut bands = vec![0..size[1]];
+            let mut bands: Vec<std::ops::Range<u32>> = std::iter::once(0..size[1]).collect();
             while let Some(rows) = bands.pop() {
                 let pixels = width * u64::from(rows.end - rows.start);
                 let mut band = frame;
@@ -193,7 +194,8 @@ impl Renderer {
                     self.surfaces.reserve(&gpu, pixels as u32, room as u32);
                     band.layer_capacity = self.surfaces.capacity();
                     let bound = bind_frame(&gpu, &self.frame_layout, &band);
-                    let (found, most_on_pixel) = self.surfaces.capture(&gpu, &meshes, target, &bound, rows.clone())?;
+                    let (found, most_on_pixel) =
+                        self.surfaces.capture(&gpu, &meshes, target, &bound, rows.clone())?;
                     if found > self.surfaces.capacity() {
                         // Too little room: make it, or draw the band in two.
                         if u64::from(found) * LAYER_BYTES <= most {
@@ -219,8 +221,7 @@ impl Renderer {
                 let ready = self.slabs.prepare(&gpu, &inputs, target, lists)?;
                 let mut encoder =
                     gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-                stats.saturate_looks +=
-                    self.slabs.draw(&gpu, &mut encoder, &ready, target, &bound, rows);
+                stats.saturate_looks += self.slabs.draw(&gpu, &mut encoder, &ready, target, &bound, rows);
                 gpu.queue.submit([encoder.finish()]);
                 stats.draws += stack.draws.len() as u32;
                 stats.bands += 1;

@@ -108,7 +108,10 @@ pub(crate) fn bind_picture(
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("picture"),
         layout,
-        entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(picture) }],
+        entries: &[wgpu::BindGroupEntry {
+            binding: 0,
+            resource: wgpu::BindingResource::TextureView(picture),
+        }],
     })
 }
 

@@ -61,9 +61,8 @@ mod tests {
         let transfer = Transfer::new(vec![point(-1000.0, 0.9), point(0.0, 0.0), point(3000.0, 0.001)], 1.0)
             .expect("transfer");
         let table = Table::new(&transfer);
-        let whole = |j: usize| {
-            f64::from(table.texels[NODES + j][3]) + f64::from(table.texels[2 * NODES + j][3])
-        };
+        let whole =
+            |j: usize| f64::from(table.texels[NODES + j][3]) + f64::from(table.texels[2 * NODES + j][3]);
         // Faint values after a dense stretch: where single precision would have lost them.
         let (a, b) = (3000, 3005);
         let mean = (whole(b) - whole(a)) / 5.0;

@@ -39,6 +39,7 @@ pub(crate) mod gpu_data {
 pub(crate) use gpu_data::Form;
 
 /// A camera over a picture of a size.
+#[expect(clippy::struct_field_names, reason = "a transform is named by its ends")]
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct View {
     /// `view_from_world`.
@@ -54,9 +55,8 @@ pub(crate) struct View {
 impl View {
     pub(crate) fn new(camera: &Camera, size: [u32; 2]) -> Result<Self, GpuError> {
         let frame = camera.frame()?;
-        let world_from_view =
-            Affine::from_columns(frame.right, frame.up, frame.forward, camera.eye)
-                .map_err(|_singular| crate::scene::CameraError::NotFinite)?;
+        let world_from_view = Affine::from_columns(frame.right, frame.up, frame.forward, camera.eye)
+            .map_err(|_singular| crate::scene::CameraError::NotFinite)?;
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let (half, perspective) = match camera.projection {
             Projection::Perspective { fov_rad } => ((fov_rad / 2.0).tan(), true),

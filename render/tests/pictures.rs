@@ -6,9 +6,7 @@ use render::gpu::{Gpu, GpuError};
 use render::image::FloatImage;
 use render::reference;
 use render::renderer::{Quality, Renderer, Stats};
-use render::scene::{
-    Camera, MeshItem, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem,
-};
+use render::scene::{Camera, MeshItem, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem};
 use render::volume::{
     Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Side, Transfer, TriangleMesh, Vector, synth,
 };
@@ -109,9 +107,8 @@ fn scene(volumes: Vec<VolumeItem>, meshes: Vec<MeshItem>) -> Scene {
 
 /// A closed box as a mesh.
 fn block(centre: [f64; 3], half: f64, color: [f64; 3], opacity: f64) -> MeshItem {
-    let corner = |i: usize| {
-        Point::from([0, 1, 2].map(|a| centre[a] + if i >> a & 1 == 1 { half } else { -half }))
-    };
+    let corner =
+        |i: usize| Point::from([0, 1, 2].map(|a| centre[a] + if i >> a & 1 == 1 { half } else { -half }));
     let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let triangles = sides.iter().flat_map(|s| [[s[0], s[1], s[2]], [s[0], s[2], s[3]]]).collect();
     MeshItem {
@@ -128,14 +125,14 @@ fn plane(at: [f64; 3], normal: [f64; 3]) -> Cutter {
 }
 
 /// The pieces that two crossing planes make, each with its own pose.
-fn pieces(poses: [Affine; 3]) -> Vec<Piece> {
+fn pieces(poses: &[Affine; 3]) -> Vec<Piece> {
     let (a, b) = (plane([0.0, 0.0, 2.0], [0.3, 0.2, 1.0]), plane([2.0, 0.0, 0.0], [1.0, 0.4, -0.3]));
     let keeps = [
         vec![(a, Side::Plus)],
         vec![(a, Side::Minus), (b, Side::Plus)],
         vec![(a, Side::Minus), (b, Side::Minus)],
     ];
-    keeps.into_iter().zip(poses).map(|(keep, pose)| Piece { keep, pose }).collect()
+    keeps.into_iter().zip(poses).map(|(keep, &pose)| Piece { keep, pose }).collect()
 }
 
 #[test]
@@ -171,9 +168,11 @@ fn two_volumes_that_overlap() {
 fn a_volume_cut_and_left_in_place_is_the_whole() {
     let whole = scene(vec![volume(TextureFormat::R16)], vec![]);
     let mut cut = whole.clone();
-    cut.volumes[0].pieces = pieces([Affine::identity(); 3]);
+    cut.volumes[0].pieces = pieces(&[Affine::identity(); 3]);
     agrees(&cut, "cut in place", 60.0, 2.0);
-    let (Some((a, _)), Some((b, _))) = (draw(&whole, Quality::Good), draw(&cut, Quality::Good)) else { return };
+    let (Some((a, _)), Some((b, _))) = (draw(&whole, Quality::Good), draw(&cut, Quality::Good)) else {
+        return;
+    };
     let d = a.difference(&b, whole.background).unwrap();
     // Where a cut splits a sub-step it is integrated in two parts, which is finer.
     assert!(d.psnr_db > 55.0 && d.max < 4.0, "{d:?}");
@@ -183,7 +182,7 @@ fn a_volume_cut_and_left_in_place_is_the_whole() {
 fn fragments_that_moved_and_overlap() {
     let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
     let turn = Affine::rotation_about(Point::origin(), Vector::new(0.1, 0.3, 1.0), 0.5);
-    s.volumes[0].pieces = pieces([
+    s.volumes[0].pieces = pieces(&[
         Affine::translation(Vector::new(3.0, -2.0, 9.0)) * turn,
         Affine::translation(Vector::new(-5.0, 1.0, 2.0)),
         turn,
@@ -203,8 +202,9 @@ fn cylinders_keep_their_inside_and_their_outside() {
     }
     let whole = scene(vec![volume(TextureFormat::R16)], vec![]);
     let mut both = whole.clone();
-    both.volumes[0].pieces =
-        [Side::Plus, Side::Minus].map(|side| Piece { keep: vec![(tube, side)], pose: Affine::identity() }).into();
+    both.volumes[0].pieces = [Side::Plus, Side::Minus]
+        .map(|side| Piece { keep: vec![(tube, side)], pose: Affine::identity() })
+        .into();
     agrees(&both, "both sides of a cylinder", 55.0, 4.0);
 }
 
@@ -236,7 +236,7 @@ fn surfaces_that_cross_each_other_inside_a_cut_volume() {
             block([-9.0, 3.0, -6.0], 7.0, [0.3, 1.0, 0.3], 1.0),
         ],
     );
-    s.volumes[0].pieces = pieces([
+    s.volumes[0].pieces = pieces(&[
         Affine::translation(Vector::new(0.0, 0.0, 4.0)),
         Affine::identity(),
         Affine::translation(Vector::new(-3.0, 0.0, 0.0)),
@@ -294,8 +294,9 @@ fn lossy_textures_state_their_error_and_stay_near() {
 
 #[test]
 fn a_scene_far_from_the_origin_gives_the_same_picture() {
-    let mut s = scene(vec![volume(TextureFormat::R16)], vec![block([2.0, -8.0, 4.0], 9.0, [0.2, 0.6, 1.0], 0.4)]);
-    s.volumes[0].pieces = pieces([Affine::identity(); 3]);
+    let mut s =
+        scene(vec![volume(TextureFormat::R16)], vec![block([2.0, -8.0, 4.0], 9.0, [0.2, 0.6, 1.0], 0.4)]);
+    s.volumes[0].pieces = pieces(&[Affine::identity(); 3]);
     let near = draw(&s, Quality::Good);
     let far = Vector::new(1e6, -1e6, 1e6);
     let shift = Affine::translation(far);
@@ -333,7 +334,8 @@ fn thousands_of_faint_slices_keep_their_sum() {
     // 2048 sub-steps through a slab that lets e⁻¹ through in all.
     let grid = synth::homogeneous([16, 16, 16], 1.0, Affine::translation(Vector::repeat(-7.5))).unwrap();
     let opacity = -(-1.0_f64 / 16.0).exp_m1();
-    let transfer = Transfer::new(vec![point(0.0, 1.0, 0.5, 0.25, opacity), point(2.0, 1.0, 0.5, 0.25, opacity)], 1.0);
+    let transfer =
+        Transfer::new(vec![point(0.0, 1.0, 0.5, 0.25, opacity), point(2.0, 1.0, 0.5, 0.25, opacity)], 1.0);
     let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
     s.volumes[0].grid = Arc::new(grid);
     s.volumes[0].transfer = Arc::new(transfer.unwrap());

@@ -48,10 +48,8 @@ fn every_mirror_has_its_struct_s_layout() {
     for (name, _) in SOURCES.iter().filter(|(name, _)| name.starts_with("passes/")) {
         for (_, ty) in parsed(name).types.iter() {
             if let (Some(name), naga::TypeInner::Struct { members, span }) = (&ty.name, &ty.inner) {
-                let fields: Vec<(String, usize)> = members
-                    .iter()
-                    .map(|m| (m.name.clone().unwrap(), m.offset as usize))
-                    .collect();
+                let fields: Vec<(String, usize)> =
+                    members.iter().map(|m| (m.name.clone().unwrap(), m.offset as usize)).collect();
                 seen.insert(name.clone(), (fields, *span as usize));
             }
         }

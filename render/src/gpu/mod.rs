@@ -76,9 +76,8 @@ impl Gpu {
             required_limits: wanted_limits(&adapter),
             ..Default::default()
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&request)).map_err(|e| {
-            GpuError::NoDevice { adapter: adapter.get_info().name, reason: e.to_string() }
-        })?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&request))
+            .map_err(|e| GpuError::NoDevice { adapter: adapter.get_info().name, reason: e.to_string() })?;
         Ok(Self::from_wgpu(&adapter, device, queue))
     }
 

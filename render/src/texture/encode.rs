@@ -56,7 +56,13 @@ pub(crate) fn encode(plan: &Plan) -> Result<Texels, GpuError> {
             // One stored unit a step where the samples are whole numbers and few enough: nothing is lost.
             let unit = key.grid.rescale().slope.abs();
             let whole = key.grid.samples().is_integer() && span <= unit * 65535.0 && key.reduce == [1; 3];
-            let scale = if whole { unit * 65535.0 } else if span > 0.0 { span } else { 1.0 };
+            let scale = if whole {
+                unit * 65535.0
+            } else if span > 0.0 {
+                span
+            } else {
+                1.0
+            };
             let bytes = fill(plan, 2, |v, out| {
                 out.copy_from_slice(&(unorm(v, low, scale, 65535.0) as u16).to_le_bytes());
             });
@@ -161,8 +167,7 @@ fn error_over(
         .map(|i| pair(i, value(plan, [i % nx, i / nx % ny, i / (nx * ny)])))
         .reduce(|| (0.0, 0.0), |a, b| (a.0 + b.0, a.1.max(b.1)));
     let count = (nx * ny * nz) as f64 * per_texel;
-    let psnr_db =
-        if square > 0.0 { 10.0 * (peak * peak * count / square).log10() } else { f64::INFINITY };
+    let psnr_db = if square > 0.0 { 10.0 * (peak * peak * count / square).log10() } else { f64::INFINITY };
     (max, psnr_db)
 }
 

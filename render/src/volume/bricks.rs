@@ -28,8 +28,7 @@ impl Bricks {
                 let at = [b % count[0], b / count[0] % count[1], b / (count[0] * count[1])];
                 // Interpolation between voxel centres reaches one sample past either end.
                 let low = at.map(|i| (i * Self::EDGE).saturating_sub(1));
-                let high: [usize; 3] =
-                    std::array::from_fn(|a| ((at[a] + 1) * Self::EDGE + 1).min(extent[a]));
+                let high: [usize; 3] = std::array::from_fn(|a| ((at[a] + 1) * Self::EDGE + 1).min(extent[a]));
                 let mut range = [f64::INFINITY, f64::NEG_INFINITY];
                 for z in low[2]..high[2] {
                     for y in low[1]..high[1] {

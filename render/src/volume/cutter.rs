@@ -124,7 +124,7 @@ fn plane_sign(n: &Vector, p: &Point, q: &Point) -> f64 {
     for (count, (a, b)) in products.into_iter().enumerate() {
         let product = a * b;
         let tail = a.mul_add(b, -product);
-        grow(&mut expansion[..2 * count + 1], tail);
+        grow(&mut expansion[..=2 * count], tail);
         grow(&mut expansion[..2 * count + 2], product);
     }
     // Components do not overlap and rise in size: the last that is not zero has the sign.

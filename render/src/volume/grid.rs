@@ -74,6 +74,7 @@ impl Samples {
     }
 
     /// Sample `index` as stored, without rescale.
+    #[expect(clippy::useless_conversion, reason = "one of the kinds is f64 already")]
     fn stored(&self, index: usize) -> f64 {
         each_kind!(self, v => f64::from(v[index]))
     }
@@ -144,6 +145,7 @@ impl Grid {
     ///
     /// # Errors
     /// [`GridError`]: an empty axis, a wrong number of samples, a rescale that cannot be applied.
+    #[expect(clippy::useless_conversion, reason = "one of the kinds is f64 already")]
     pub fn new(
         extent: [usize; 3],
         samples: Samples,
@@ -162,21 +164,21 @@ impl Grid {
             return Err(GridError::Rescale { slope, intercept });
         }
         let (lo, hi, finite) = each_kind!(&samples, v => v
-            .par_chunks(1 << 16)
-            .map(|chunk| {
-                let mut acc = (f64::INFINITY, f64::NEG_INFINITY, 0_usize);
-                for &s in chunk {
-                    let s = f64::from(s);
-                    if s.is_finite() {
-                        acc = (acc.0.min(s), acc.1.max(s), acc.2 + 1);
-                    }
+        .par_chunks(1 << 16)
+        .map(|chunk| {
+            let mut acc = (f64::INFINITY, f64::NEG_INFINITY, 0_usize);
+            for &s in chunk {
+                let s = f64::from(s);
+                if s.is_finite() {
+                    acc = (acc.0.min(s), acc.1.max(s), acc.2 + 1);
                 }
-                acc
-            })
-            .reduce(
-                || (f64::INFINITY, f64::NEG_INFINITY, 0),
-                |a, b| (a.0.min(b.0), a.1.max(b.1), a.2 + b.2),
-            ));
+            }
+            acc
+        })
+        .reduce(
+            || (f64::INFINITY, f64::NEG_INFINITY, 0),
+            |a, b| (a.0.min(b.0), a.1.max(b.1), a.2 + b.2),
+        ));
         let non_finite = samples.len() - finite;
         let (lo, hi) = if finite == 0 { (0.0, 0.0) } else { (lo, hi) };
         let (a, b) = (lo * slope + intercept, hi * slope + intercept);
@@ -251,11 +253,7 @@ impl Grid {
     /// [`Grid::value`] by position in the array.
     pub fn value_at(&self, index: usize) -> f64 {
         let stored = self.samples.stored(index);
-        if stored.is_finite() {
-            stored * self.rescale.slope + self.rescale.intercept
-        } else {
-            self.padding
-        }
+        if stored.is_finite() { stored * self.rescale.slope + self.rescale.intercept } else { self.padding }
     }
 
     /// All values, after rescale and padding, as `f32`, in parallel; `[x, y, z]`, x fastest.

@@ -27,7 +27,7 @@ pub enum SpaceError {
     /// The matrix is not a rotation and a translation.
     #[error("the matrix is not rigid (a rotation and a translation): it departs by {departure:.3e}")]
     NotRigid {
-        /// Largest element of |RᵀR − 1|, or 2 for a mirror.
+        /// Largest element of `RᵀR − 1`, or 2 for a mirror.
         departure: f64,
     },
 }
@@ -53,10 +53,7 @@ impl Affine {
 
     /// A shift by `by`.
     pub fn translation(by: Vector) -> Self {
-        Self {
-            matrix: Matrix4::new_translation(&by),
-            inverse: Matrix4::new_translation(&-by),
-        }
+        Self { matrix: Matrix4::new_translation(&by), inverse: Matrix4::new_translation(&-by) }
     }
 
     /// A turn of `angle_rad` about the line through `centre` along `axis` (need not be unit length),

@@ -119,9 +119,8 @@ impl Slabs {
         let group = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
         };
-        let read = |binding| {
-            buffer_entry(binding, wgpu::ShaderStages::FRAGMENT, Storage { read_only: true }, false)
-        };
+        let read =
+            |binding| buffer_entry(binding, wgpu::ShaderStages::FRAGMENT, Storage { read_only: true }, false);
         let flat = |binding| texture_entry(binding, wgpu::TextureViewDimension::D2, false);
         let mut entries: Vec<_> =
             (0..SLOTS as u32).map(|b| texture_entry(b, wgpu::TextureViewDimension::D3, true)).collect();
@@ -277,8 +276,7 @@ impl Slabs {
         constants.push(("GAPS", f64::from(u8::from(*gaps))));
         constants.push(("SURFACES", f64::from(u8::from(*surfaces))));
         constants.push(("LAYERS", f64::from(u8::from(*layers))));
-        let options =
-            wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
+        let options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
         // Front to back: what is there already lets (1 - its opacity) of the new through.
         let under = wgpu::BlendComponent {
             src_factor: wgpu::BlendFactor::OneMinusDstAlpha,

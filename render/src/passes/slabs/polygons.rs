@@ -70,9 +70,8 @@ pub(crate) fn hull(mut points: Polygon) -> Polygon {
     if points.len() < 3 {
         return Polygon::new();
     }
-    let turn = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
-        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    };
+    let turn =
+        |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     let mut chain: Polygon = Vec::with_capacity(2 * points.len());
     let half = |chain: &mut Polygon, points: &mut dyn Iterator<Item = &[f64; 2]>| {
         let floor = chain.len();

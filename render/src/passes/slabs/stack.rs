@@ -206,7 +206,9 @@ mod tests {
             (6, vec![[13.0, 0.2], [14.0, 0.2], [14.0, 9.0], [13.0, 9.0]]),
         ];
         let mut found: Vec<Vec<usize>> = groups(present).into_iter().map(|g| g.members).collect();
-        found.iter_mut().for_each(|g| g.sort_unstable());
+        for group in &mut found {
+            group.sort_unstable();
+        }
         found.sort();
         assert_eq!(found, [vec![0, 1, 3], vec![2], vec![4, 5, 6]], "joined groups");
     }

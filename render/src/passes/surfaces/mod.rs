@@ -379,11 +379,7 @@ impl Lists {
         let target = wgpu::BufferUsages::COPY_DST;
         Self {
             heads: buffer("surfaces.heads", u64::from(pixels) * HEAD_BYTES, target),
-            layers: buffer(
-                "surfaces.layers",
-                u64::from(capacity) * LAYER_BYTES,
-                wgpu::BufferUsages::empty(),
-            ),
+            layers: buffer("surfaces.layers", u64::from(capacity) * LAYER_BYTES, wgpu::BufferUsages::empty()),
             totals: buffer("surfaces.totals", 8, target | wgpu::BufferUsages::COPY_SRC),
             capacity,
         }

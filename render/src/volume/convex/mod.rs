@@ -79,7 +79,9 @@ impl ConvexSolid {
         let mut faces: Vec<Vec<Point>> =
             self.faces.iter().map(|f| f.iter().map(|p| b_from_a.point(p)).collect()).collect();
         if b_from_a.linear().determinant() < 0.0 {
-            faces.iter_mut().for_each(|f| f.reverse());
+            for face in &mut faces {
+                face.reverse();
+            }
         }
         Self { faces }
     }
