@@ -15,16 +15,16 @@ const UI: [&str; 7] = ["egui", "eframe", "egui_wgpu", "egui_extras", "winit", "r
 const FORMATS: [&str; 13] = [
     "dicom",
     "dicom_core",
+    "dicom_dictionary_std",
     "dicom_object",
     "dicom_pixeldata",
-    "dicom_dictionary_std",
-    "nifti",
+    "dicom_transfer_syntax_registry",
     "gltf",
+    "jpeg2k",
+    "jpeg_decoder",
+    "nifti",
+    "roxmltree",
     "tobj",
-    "stl_io",
-    "ply_rs_bw",
-    "vtkio",
-    "netcdf3",
     "zip",
 ];
 /// Crates that talk to the GPU.

@@ -7,7 +7,7 @@ use crate::gather::{BrickCache, Counts, Gathered};
 use crate::gpu::{Gpu, GpuError, read_texture};
 use crate::image::FloatImage;
 use crate::passes::present::Present;
-use crate::passes::slabs::{Inputs, Slabs, Spacing, Stack, upload};
+use crate::passes::slabs::{Inputs, SLOTS, Slabs, Spacing, Stack, upload};
 use crate::passes::surfaces::{LAYER_BYTES, Surfaces};
 use crate::scene::Scene;
 use crate::target::{Target, buffer_entry};
@@ -155,14 +155,25 @@ impl Renderer {
         let spacing = Spacing::new(&gathered.members, step_mm, STEPS);
         let target =
             self.target.as_ref().ok_or(GpuError::EmptyPicture { width: size[0], height: size[1] })?;
-        let spacing_or_none = spacing.unwrap_or(Spacing { near_mm: 0.0, step_mm, steps: STEPS, slabs: 1 });
-        let frame = frame_data(scene, &view, &spacing_or_none);
 
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         clear(&mut encoder, &target.picture_view);
-        let whole = bind_frame(&gpu, &self.frame_layout, &frame);
-        if let Some(spacing) = spacing {
-            let stack = Stack::new(&gathered.members, &view, &spacing);
+        let nothing = Spacing { near_mm: 0.0, step_mm, steps: STEPS, slabs: 1 };
+        let mut whole = bind_frame(&gpu, &self.frame_layout, &frame_data(scene, &view, &nothing));
+        if let Some(mut spacing) = spacing {
+            let mut stack = Stack::new(&gathered.members, &view, &spacing);
+            if stack.most_overlapping > SLOTS {
+                // Draws of one slab follow each other there, so a slab is one sub-step: its order is then
+                // wrong by less than that.
+                spacing = spacing.single_steps();
+                stack = Stack::new(&gathered.members, &view, &spacing);
+                stats.notes.push(format!(
+                    "{} fragments overlap in the picture; beyond {SLOTS} they are mixed slice by slice",
+                    stack.most_overlapping
+                ));
+            }
+            let frame = frame_data(scene, &view, &spacing);
+            whole = bind_frame(&gpu, &self.frame_layout, &frame);
             let (fragments, planes, cylinders) = gathered.to_gpu(&view, &spacing);
             let inputs = Inputs {
                 stack: &stack,

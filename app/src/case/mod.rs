@@ -1,7 +1,7 @@
 //! The case: what is planned, as plain data. Volumes, cutters, fragments, implants and the view.
 //!
 //! A [`Case`] holds no samples and no triangles, so a clone is cheap and undo keeps whole copies. What
-//! the sources name is loaded into [`Assets`], shared by `Arc`. [`file`] reads and writes it (see
+//! the sources name is loaded into [`Assets`], shared by `Arc`. [`mod@file`] reads and writes it (see
 //! `FORMAT.md`), [`edit`] changes it, [`history`] takes changes back, [`split`] finds the pieces that
 //! cutters make. Everything is in world space: LPS, mm. Unknown keys of a file are kept in `other`, at
 //! every level, and written back.
@@ -261,7 +261,7 @@ impl Case {
     }
 
     /// A fragment as the renderer takes it. A cutter that is not there keeps everything: [`Edit`] and
-    /// [`file`] let none such in.
+    /// [`mod@file`] let none such in.
     pub fn piece(&self, fragment: &Fragment) -> Piece {
         let keep = fragment.keep.iter().filter_map(|(id, side)| Some((self.cutter(id)?.cutter, *side)));
         Piece { keep: keep.collect(), pose: fragment.pose }

@@ -1,7 +1,7 @@
 //! `bench`: run time beside error. `frame` draws, `compress` makes textures.
 //!
 //! Each result is one JSON object a line (`--json`) or a line of a table. Times are the median of
-//! [`REPEATS`] runs after one that is not counted, so that neither the first upload nor one busy moment decides.
+//! `REPEATS` runs after one that is not counted, so that neither the first upload nor one busy moment decides.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -48,23 +48,18 @@ struct Cylinder {
     pad_1: u32,
 }
 
-const SLOTS: u32 = 8u;
 
 const SKIP_LAYERS: u32 = 0x80000000u;
 
 struct Component {
-    fragments: array<u32, 8>,
+    fragments: array<u32, 4>,
 }
 
 @group(1) @binding(0) var volume_0: texture_3d<f32>;
 @group(1) @binding(1) var volume_1: texture_3d<f32>;
 @group(1) @binding(2) var volume_2: texture_3d<f32>;
 @group(1) @binding(3) var volume_3: texture_3d<f32>;
-@group(1) @binding(4) var volume_4: texture_3d<f32>;
-@group(1) @binding(5) var volume_5: texture_3d<f32>;
-@group(1) @binding(6) var volume_6: texture_3d<f32>;
-@group(1) @binding(7) var volume_7: texture_3d<f32>;
-@group(1) @binding(8) var linear: sampler;
+@group(1) @binding(4) var linear: sampler;
 
 @group(2) @binding(0) var<storage, read> fragments: array<Fragment>;
 @group(2) @binding(1) var<storage, read> planes: array<Form>;
@@ -83,10 +78,6 @@ override KIND_0: u32 = 0u;
 override KIND_1: u32 = 0u;
 override KIND_2: u32 = 0u;
 override KIND_3: u32 = 0u;
-override KIND_4: u32 = 0u;
-override KIND_5: u32 = 0u;
-override KIND_6: u32 = 0u;
-override KIND_7: u32 = 0u;
 // Whether any fragment keeps the outside of a cylinder.
 override GAPS: bool = false;
 // Whether surfaces may lie in the slab, and whether any of the picture's is translucent.
@@ -381,16 +372,11 @@ fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
     let z1 = f32(first + frame.steps) * frame.step_mm;
 
     var s0: Slot; var s1: Slot; var s2: Slot; var s3: Slot;
-    var s4: Slot; var s5: Slot; var s6: Slot; var s7: Slot;
     let ids = components[component].fragments;
     if KIND_0 != KIND_NONE { s0 = open_slot(ids[0], e, z0, z1); begin(KIND_0, &s0, ids[0], volume_0); }
     if KIND_1 != KIND_NONE { s1 = open_slot(ids[1], e, z0, z1); begin(KIND_1, &s1, ids[1], volume_1); }
     if KIND_2 != KIND_NONE { s2 = open_slot(ids[2], e, z0, z1); begin(KIND_2, &s2, ids[2], volume_2); }
     if KIND_3 != KIND_NONE { s3 = open_slot(ids[3], e, z0, z1); begin(KIND_3, &s3, ids[3], volume_3); }
-    if KIND_4 != KIND_NONE { s4 = open_slot(ids[4], e, z0, z1); begin(KIND_4, &s4, ids[4], volume_4); }
-    if KIND_5 != KIND_NONE { s5 = open_slot(ids[5], e, z0, z1); begin(KIND_5, &s5, ids[5], volume_5); }
-    if KIND_6 != KIND_NONE { s6 = open_slot(ids[6], e, z0, z1); begin(KIND_6, &s6, ids[6], volume_6); }
-    if KIND_7 != KIND_NONE { s7 = open_slot(ids[7], e, z0, z1); begin(KIND_7, &s7, ids[7], volume_7); }
 
     // The next surface: a translucent layer or the opaque one, whichever is nearer.
     var layer = NO_LAYER;
@@ -429,11 +415,7 @@ fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
         if KIND_1 != KIND_NONE { sum += advance(KIND_1, &s1, ids[1], volume_1, end, ray); }
         if KIND_2 != KIND_NONE { sum += advance(KIND_2, &s2, ids[2], volume_2, end, ray); }
         if KIND_3 != KIND_NONE { sum += advance(KIND_3, &s3, ids[3], volume_3, end, ray); }
-        if KIND_4 != KIND_NONE { sum += advance(KIND_4, &s4, ids[4], volume_4, end, ray); }
-        if KIND_5 != KIND_NONE { sum += advance(KIND_5, &s5, ids[5], volume_5, end, ray); }
-        if KIND_6 != KIND_NONE { sum += advance(KIND_6, &s6, ids[6], volume_6, end, ray); }
-        if KIND_7 != KIND_NONE { sum += advance(KIND_7, &s7, ids[7], volume_7, end, ray); }
-        let part = absorbed_per_depth(sum.a);
+                        let part = absorbed_per_depth(sum.a);
         color += (1.0 - alpha) * part * sum.rgb;
         alpha += (1.0 - alpha) * part * sum.a;
 

@@ -72,6 +72,11 @@ impl Spacing {
         Some(Self { near_mm, step_mm, steps, slabs })
     }
 
+    /// The same stack with one sub-step a slab.
+    pub(crate) fn single_steps(self) -> Self {
+        Self { steps: 1, slabs: self.slabs * self.steps, ..self }
+    }
+
     pub(crate) fn slab_mm(&self) -> f64 {
         self.step_mm * f64::from(self.steps)
     }
@@ -125,18 +130,28 @@ impl Stack {
     fn add(&mut self, slab: u32, members: &[Member], group: &Group) {
         let polygon = &group.outline;
         let surfaces = group.members.iter().any(|&m| members[m].volume.is_none());
-        let mut volumes: Vec<_> = group.members.iter().filter_map(|&m| members[m].volume).collect();
-        // By kind, so that fewer different shaders are made.
-        volumes.sort_by_key(|&(fragment, kind, _)| (kind, fragment));
-        self.most_overlapping = self.most_overlapping.max(volumes.len());
-        let mut chunks: Vec<&[(u32, Kind, usize)]> = volumes.chunks(SLOTS).collect();
-        if chunks.is_empty() {
-            chunks.push(&[]);
+        let mut volumes: Vec<_> = group
+            .members
+            .iter()
+            .filter_map(|&m| {
+                let depth = members[m].proxy.depth;
+                members[m].volume.map(|v| (v, depth[0] + depth[1]))
+            })
+            .collect();
+        // What does not fit in one draw goes front to back.
+        if group.members.len() > SLOTS {
+            volumes.sort_by(|a, b| a.1.total_cmp(&b.1));
         }
-        for (number, chunk) in chunks.into_iter().enumerate() {
+        self.most_overlapping = self.most_overlapping.max(volumes.len());
+        let mut nothing: [(u32, Kind, usize); 0] = [];
+        let empty = volumes.is_empty().then_some(&mut nothing[..]);
+        let mut volumes: Vec<_> = volumes.into_iter().map(|(volume, _)| volume).collect();
+        for (number, chunk) in volumes.chunks_mut(SLOTS).chain(empty).enumerate() {
+            // By kind, so that fewer different shaders are made.
+            chunk.sort_by_key(|&(fragment, kind, _)| (kind, fragment));
             let mut slots: Slots = [(Kind::None, 0); SLOTS];
             let mut fragments = [u32::MAX; SLOTS];
-            for (slot, &(fragment, kind, texture)) in chunk.iter().enumerate() {
+            for (slot, &mut (fragment, kind, texture)) in chunk.iter_mut().enumerate() {
                 slots[slot] = (kind, texture);
                 fragments[slot] = fragment;
             }
