@@ -14,9 +14,10 @@ run:
 	    exec $(osteotome); \
 	fi; \
 	set -e; \
+	export XDG_RUNTIME_DIR=$${XDG_RUNTIME_DIR:-$$(mktemp -d)}; \
 	$(osteotome) demo $(demo); \
 	$(osteotome) render $(demo)/case.json --out $(demo)/picture.png --size 768x768; \
-	XDG_RUNTIME_DIR=$$(mktemp -d) OSTEOTOME_SCREENSHOT=$(demo)/window.png \
+	OSTEOTOME_SCREENSHOT=$(demo)/window.png \
 	    xvfb-run -a -s "-screen 0 1600x1000x24" $(osteotome) $(demo)/case.json; \
 	echo "There is no display here, so the built-in case was drawn into files:"; \
 	ls "$$PWD/$(demo)"/*.png

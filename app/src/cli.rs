@@ -10,8 +10,9 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::headless;
+use crate::headless::{self, Failure};
 use crate::host::HostError;
+use crate::load::LoadError;
 
 /// Surgical planning: volumes, cuts, fragments and implants, in a window or without one.
 #[derive(Debug, Parser)]
@@ -207,6 +208,13 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 }
 
 fn window(paths: Vec<PathBuf>) -> ExitCode {
+    // A mistyped command reads as a path: say so here, not in a window that opens empty.
+    for path in &paths {
+        if let Err(source) = path.metadata() {
+            let failure = Failure::Data(LoadError::Io { path: path.clone(), source });
+            return fail(&failure.to_string(), failure.exit_code());
+        }
+    }
     match crate::host::run(paths) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

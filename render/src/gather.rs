@@ -48,7 +48,8 @@ pub(crate) struct Gathered {
     pub(crate) textures: Vec<Arc<VolumeTexture>>,
     /// Rows of all tables, [`NODES`] texels each.
     pub(crate) tables: Vec<[f32; 4]>,
-    known_tables: Vec<(Arc<Transfer>, Table)>,
+    /// What each table is of: a function over a range of values.
+    known_tables: Vec<(Arc<Transfer>, [f64; 2], Table)>,
     pub(crate) notes: Vec<String>,
     pub(crate) counts: Counts,
     /// Least distance of samples over all volumes drawn, mm.
@@ -128,7 +129,7 @@ impl Gathered {
         let world_from_voxel = item.pose * *item.grid.world_from_voxel();
         let spacing = world_from_voxel.column_lengths().into_iter().fold(f64::INFINITY, f64::min);
         self.finest_mm = Some(self.finest_mm.map_or(spacing, |f| f.min(spacing)));
-        let table = self.table(&item.transfer);
+        let table = self.table(&item.transfer, item.grid.range());
         for piece in &item.pieces {
             let mut solid = ConvexSolid::from_box(low, high);
             let view_from_unmoved = view.view_from_world * piece.pose;
@@ -191,13 +192,15 @@ impl Gathered {
         Ok(())
     }
 
-    fn table(&mut self, transfer: &Arc<Transfer>) -> usize {
-        if let Some(found) = self.known_tables.iter().position(|(t, _)| Arc::ptr_eq(t, transfer)) {
+    fn table(&mut self, transfer: &Arc<Transfer>, range: [f64; 2]) -> usize {
+        if let Some(found) =
+            self.known_tables.iter().position(|(t, r, _)| Arc::ptr_eq(t, transfer) && *r == range)
+        {
             return found;
         }
-        let table = Table::new(transfer);
+        let table = Table::new(transfer, range);
         self.tables.extend_from_slice(&table.texels);
-        self.known_tables.push((Arc::clone(transfer), table));
+        self.known_tables.push((Arc::clone(transfer), range, table));
         self.known_tables.len() - 1
     }
 
@@ -225,7 +228,7 @@ impl Gathered {
                     pad_1: 0,
                 }
             }));
-            let (_, table) = &self.known_tables[fragment.table];
+            let (_, _, table) = &self.known_tables[fragment.table];
             let texture = &fragment.texture;
             let points = fragment.transfer.points();
             let span = points[points.len() - 1].value - points[0].value;

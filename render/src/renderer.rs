@@ -54,7 +54,7 @@ pub struct Stats {
     pub prepare_ms: f64,
     /// Sub-step, mm of depth.
     pub step_mm: f64,
-    /// Slabs of the stack, and those with something in them.
+    /// Slabs of the stack.
     pub slabs: u32,
     /// Slabs with something in them.
     pub slabs_occupied: u32,

@@ -11,7 +11,7 @@ pub(crate) const ROWS: usize = 3;
 ///
 /// A texel is (τ·red, τ·green, τ·blue, τ), τ in 1/mm. The antiderivative is over the table position, and
 /// stands as a rounded `f32` and the rest, so that differences of it keep 24 digits more. Error: the true τ
-/// between two nodes departs from the line by at most the function's curvature over 1/4000 of its span.
+/// between two nodes departs from the line by at most the function's curvature over 1/4000 of the span of values that occur.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Table {
     /// Value of the first node.
@@ -23,9 +23,12 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    pub(crate) fn new(transfer: &Transfer) -> Self {
+    /// The table of a function over the values between `least` and `greatest` that a grid has.
+    pub(crate) fn new(transfer: &Transfer, [least, greatest]: [f64; 2]) -> Self {
         let points = transfer.points();
-        let (low, high) = (points[0].value, points[points.len() - 1].value);
+        // Beyond its points the function is constant, beyond the grid's range it is never asked.
+        let low = points[0].value.clamp(least, greatest);
+        let high = points[points.len() - 1].value.clamp(least, greatest);
         // Some room beyond either end, so that a jump there is inside the table.
         let room = if high > low { (high - low) * 1e-3 } else { 1.0 };
         let first = low - room;
@@ -56,11 +59,20 @@ mod tests {
     use crate::volume::ControlPoint;
 
     #[test]
+    fn values_that_do_not_occur_take_no_nodes() {
+        let point = |value, a| ControlPoint { value, rgba: [1.0, 1.0, 1.0, a] };
+        let transfer =
+            Transfer::new(vec![point(-1e6, 0.0), point(0.0, 0.0), point(1.0, 0.5), point(1e6, 0.5)], 1.0);
+        let table = Table::new(&transfer.expect("transfer"), [-2.0, 2.0]);
+        assert!(table.step < 0.01, "one unit of the ramp has hundreds of nodes: {}", table.step);
+    }
+
+    #[test]
     fn the_antiderivative_differs_by_the_integral() {
         let point = |value, a| ControlPoint { value, rgba: [1.0, 0.25, 0.0, a] };
         let transfer = Transfer::new(vec![point(-1000.0, 0.9), point(0.0, 0.0), point(3000.0, 0.001)], 1.0)
             .expect("transfer");
-        let table = Table::new(&transfer);
+        let table = Table::new(&transfer, [-1e9, 1e9]);
         let whole =
             |j: usize| f64::from(table.texels[NODES + j][3]) + f64::from(table.texels[2 * NODES + j][3]);
         // Faint values after a dense stretch: where single precision would have lost them.
