@@ -18,26 +18,26 @@ fn load(path: &Path) -> Result<Vec<Item>, LoadError> {
     open(path, &Limits::default(), &Silent)
 }
 
-fn only(items: Vec<Item>) -> Item {
+pub(crate) fn only(items: Vec<Item>) -> Item {
     let [item] = <[Item; 1]>::try_from(items).expect("one item");
     item
 }
 
-fn volume(item: &Item) -> &Grid {
+pub(crate) fn volume(item: &Item) -> &Grid {
     match &item.content {
         Content::Volume(grid) => grid,
         other => panic!("{other:?} is no volume"),
     }
 }
 
-fn series(item: &Item) -> &Series {
+pub(crate) fn series(item: &Item) -> &Series {
     match &item.content {
         Content::Series(series) => series,
         other => panic!("{other:?} is no series"),
     }
 }
 
-fn codes(item: &Item) -> Vec<&'static str> {
+pub(crate) fn codes(item: &Item) -> Vec<&'static str> {
     item.notes.iter().map(|n| n.code).collect()
 }
 

@@ -234,7 +234,7 @@ impl Slabs {
                 .or_insert_with(|| self.bind_volumes(gpu, &textures, inputs.textures))
                 .clone();
             if !self.pipelines.contains_key(&variant) {
-                let pipeline = self.pipeline(gpu, &variant);
+                let pipeline = self.pipeline(gpu, variant);
                 self.pipelines.insert(variant, pipeline);
             }
             draws.push((variant, group, draw.clone()));
@@ -269,13 +269,13 @@ impl Slabs {
         })
     }
 
-    fn pipeline(&self, gpu: &Gpu, (kinds, gaps, surfaces, layers): &Variant) -> wgpu::RenderPipeline {
+    fn pipeline(&self, gpu: &Gpu, (kinds, gaps, surfaces, layers): Variant) -> wgpu::RenderPipeline {
         const NAMES: [&str; SLOTS] = ["KIND_0", "KIND_1", "KIND_2", "KIND_3"];
         let mut constants: Vec<(&str, f64)> =
-            NAMES.iter().zip(kinds).map(|(name, &kind)| (*name, f64::from(kind as u32))).collect();
-        constants.push(("GAPS", f64::from(u8::from(*gaps))));
-        constants.push(("SURFACES", f64::from(u8::from(*surfaces))));
-        constants.push(("LAYERS", f64::from(u8::from(*layers))));
+            NAMES.iter().zip(kinds).map(|(name, kind)| (*name, f64::from(kind as u32))).collect();
+        constants.push(("GAPS", f64::from(u8::from(gaps))));
+        constants.push(("SURFACES", f64::from(u8::from(surfaces))));
+        constants.push(("LAYERS", f64::from(u8::from(layers))));
         let options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
         // Front to back: what is there already lets (1 - its opacity) of the new through.
         let under = wgpu::BlendComponent {

@@ -9,8 +9,9 @@ mod made;
 
 use std::path::{Path, PathBuf};
 
-use render::volume::{Grid, Point, Series};
+use render::volume::{Grid, Point};
 
+use super::super::tests::{codes, only, series, volume};
 use super::super::{Silent, open};
 use super::walk::Encoding;
 use super::*;
@@ -193,30 +194,6 @@ fn load(path: &Path) -> Result<Vec<Item>, LoadError> {
 fn load_slices(slices: &[Slice]) -> Result<Vec<Item>, LoadError> {
     let files: Vec<_> = slices.iter().map(Slice::file).collect();
     load(folder(&files).path())
-}
-
-/// The only item.
-fn only(items: Vec<Item>) -> Item {
-    let [item] = <[Item; 1]>::try_from(items).expect("one item");
-    item
-}
-
-fn volume(item: &Item) -> &Grid {
-    match &item.content {
-        Content::Volume(grid) => grid,
-        other => panic!("{other:?} is no volume"),
-    }
-}
-
-fn series(item: &Item) -> &Series {
-    match &item.content {
-        Content::Series(series) => series,
-        other => panic!("{other:?} is no series"),
-    }
-}
-
-fn codes(item: &Item) -> Vec<&'static str> {
-    item.notes.iter().map(|n| n.code).collect()
 }
 
 /// Where a voxel lies; mm.
