@@ -81,6 +81,12 @@ impl Extent3 {
         self.x() * self.y() * self.z()
     }
 
+    /// The same volume with `z` slices, at least 1 and at most its own.
+    pub(crate) fn with_slices(self, z: usize) -> Self {
+        let [x, y, most] = self.voxels;
+        Self { voxels: [x, y, u32::try_from(z).unwrap_or(most).clamp(1, most)] }
+    }
+
     /// How many 4×4×1 blocks cover the volume, `[x, y, z]`; those at the far edges may be partly outside it.
     pub fn blocks(self) -> [usize; 3] {
         [self.x().div_ceil(BLOCK_EDGE), self.y().div_ceil(BLOCK_EDGE), self.z()]
