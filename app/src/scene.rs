@@ -39,6 +39,7 @@ fn volume(case: &Case, volume: &Volume, assets: &Assets) -> Option<VolumeItem> {
         return None;
     }
     Some(VolumeItem {
+        packed: None,
         grid,
         pose: volume.pose,
         transfer: Arc::clone(&volume.transfer),

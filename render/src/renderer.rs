@@ -11,7 +11,7 @@ use crate::passes::slabs::{Inputs, SLOTS, Slabs, Spacing, Stack, upload};
 use crate::passes::surfaces::{LAYER_BYTES, Surfaces};
 use crate::scene::Scene;
 use crate::target::{Target, buffer_entry};
-use crate::texture::{TextureCache, TextureSummary};
+use crate::texture::{StepDecoder, TextureCache, TextureSummary};
 use crate::view::{View, gpu_data};
 
 /// How fine the sub-steps along a ray are.
@@ -80,6 +80,8 @@ pub struct Stats {
     pub layers: u64,
     /// Bands that the picture was drawn in.
     pub bands: u32,
+    /// Textures made and sent for this frame; the others were there.
+    pub textures_sent: u64,
     /// Textures, one an entry.
     pub textures: Vec<TextureSummary>,
     /// What was replaced or reduced, in sentences.
@@ -127,6 +129,11 @@ impl Renderer {
     /// The device.
     pub fn gpu(&self) -> &Arc<Gpu> {
         &self.gpu
+    }
+
+    /// What decodes the steps of time series from now on; [`StepDecoder::Auto`] at first.
+    pub fn set_step_decoder(&mut self, decoder: StepDecoder) {
+        self.textures.set_decoder(decoder);
     }
 
     /// The picture last drawn over its background, display RGBA; `None` before the first.
@@ -293,6 +300,7 @@ impl Renderer {
             fragments_skipped: fragments_empty,
             bricks,
             bricks_skipped: bricks - bricks_occupied,
+            textures_sent: gathered.textures_sent,
             textures: gathered.textures.iter().map(|t| t.summary.clone()).collect(),
             notes,
             ..Stats::default()

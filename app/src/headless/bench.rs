@@ -16,7 +16,6 @@ use serde_json::{Map, Value, json};
 
 use super::input::Input;
 use super::plot::{Chart, Series};
-use super::render::format_name;
 use super::{Failure, Terminal, compress, input, say, write_file};
 use crate::cli::{BenchArgs, BenchName, Format};
 use crate::load::Progress as _;
@@ -114,10 +113,10 @@ fn frame(input: &Input, args: &BenchArgs) -> Result<Measured, Failure> {
             let bytes: u64 = stats.textures.iter().map(|t| t.bytes).sum();
             let largest = stats.textures.iter().map(|t| t.max_error).fold(0.0, f64::max);
             // What the adapter lacks is replaced: the row names what was drawn.
-            let drawn: Vec<&str> = stats.textures.iter().map(|t| format_name(t.format)).collect();
-            let replaced = drawn.iter().any(|name| *name != format_name(texture));
+            let drawn: Vec<String> = stats.textures.iter().map(|t| t.stored.to_string()).collect();
+            let replaced = drawn.iter().any(|name| name != texture.name());
             let row = json!({
-                "bench": "frame", "adapter": gpu.adapter(), "texture": format_name(texture),
+                "bench": "frame", "adapter": gpu.adapter(), "texture": texture.name(),
                 "drawn_as_asked": !replaced, "size": SIZE, "shading": "none", "spacing_voxels": spacing, "step_mm": stats.step_mm,
                 "runs": times.len(), "frame_ms": median(times), "generate_ms": generate_ms, "texture_bytes": bytes,
                 "texture_max_error": largest, "psnr_db": apart.psnr_db, "max_error_255": apart.max,

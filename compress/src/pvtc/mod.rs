@@ -167,6 +167,14 @@ impl Layout {
         (HEAD_BYTES + self.table_bytes()) as f64 / (EDGE * EDGE * usize::from(self.s * self.t)) as f64
     }
 
+    /// Where the end points of a step of the group, from 0, lie in the two words of a head: the lowest bit, and the
+    /// greatest number. None past the last step.
+    pub fn field(self, step: usize) -> Option<(u32, u32)> {
+        let steps = usize::from(self.t);
+        let field = (step < steps).then(|| ends::Field::new(steps, step))?;
+        Some((field.shift, field.most))
+    }
+
     /// Bytes of the table of a sub-volume.
     fn table_bytes(self) -> usize {
         4 * usize::from(self.s)
