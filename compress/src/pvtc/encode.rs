@@ -3,11 +3,19 @@
 use rayon::prelude::*;
 
 use super::ends::Field;
+use super::fit::fitted;
 use super::{EDGE, Encoder, HEAD_BYTES, Layout};
 use crate::Extent3;
 
 /// The values of T steps of a sub-volume of N voxels, x fastest, then y, then z.
 pub(super) type Samples<const N: usize, const T: usize> = [[u8; N]; T];
+
+/// End points, U and D of each step, and the index of each voxel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Choice<const N: usize, const T: usize> {
+    pub(super) ends: [[u32; 2]; T],
+    pub(super) indices: [u8; N],
+}
 
 /// Encodes one group. There are 1 to T steps, and all lengths are those of the layout and the extent.
 pub(super) fn group(layout: Layout, steps: &[&[u8]], extent: Extent3, encoder: Encoder, encoded: &mut [u8]) {
@@ -50,11 +58,12 @@ fn rows<const N: usize, const T: usize>(
         let (heads, _) = heads.as_chunks_mut::<HEAD_BYTES>();
         for ((i, head), table) in heads.iter_mut().enumerate().zip(tables.chunks_mut(layout.table_bytes())) {
             let samples: Samples<N, T> = steps.map(|step| gather(step, extent, [i * EDGE, y, z]));
-            let (ends, indices) = match encoder {
-                Encoder::MinMax | Encoder::Fitted => min_max(&samples),
+            let choice = match encoder {
+                Encoder::MinMax => min_max(&samples),
+                Encoder::Fitted => fitted(&samples),
             };
-            *head = pack::<T>(&ends).to_le_bytes();
-            for (byte, indices) in table.iter_mut().zip(indices.as_chunks::<4>().0) {
+            *head = pack::<T>(&choice.ends).to_le_bytes();
+            for (byte, indices) in table.iter_mut().zip(choice.indices.as_chunks::<4>().0) {
                 *byte = indices[0] | indices[1] << 2 | indices[2] << 4 | indices[3] << 6;
             }
         }
@@ -82,7 +91,7 @@ fn pack<const T: usize>(ends: &[[u32; 2]; T]) -> u32 {
 }
 
 /// Largest and smallest value of each step, and for each voxel the first of the nearest indices.
-fn min_max<const N: usize, const T: usize>(samples: &Samples<N, T>) -> ([[u32; 2]; T], [u8; N]) {
+fn min_max<const N: usize, const T: usize>(samples: &Samples<N, T>) -> Choice<N, T> {
     let ends: [[u32; 2]; T] = std::array::from_fn(|t| {
         let (most, least) = samples[t].iter().fold((0, 255), |(most, least), &v| (v.max(most), v.min(least)));
         [most, least].map(|value| Field::new(T, t).nearest(u32::from(value)))
@@ -94,5 +103,5 @@ fn min_max<const N: usize, const T: usize>(samples: &Samples<N, T>) -> ([[u32; 2
         };
         (0..4).min_by_key(distance).unwrap_or_default()
     });
-    (ends, indices)
+    Choice { ends, indices }
 }
