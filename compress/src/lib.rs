@@ -28,6 +28,8 @@ mod extent;
 pub mod ktx2;
 mod limits;
 pub mod quality;
+mod simd;
+pub mod texture;
 
 pub use bc::BlockFormat;
 pub use extent::{Extent3, ExtentError};
