@@ -35,6 +35,8 @@ pub mod ktx2;
 mod limits;
 pub mod pvtc;
 pub mod quality;
+mod simd;
+pub mod texture;
 
 pub use bc::BlockFormat;
 pub use extent::{Extent3, ExtentError};
