@@ -21,6 +21,7 @@
 mod bc1;
 mod bc3;
 mod bc4;
+mod bc7;
 mod block;
 mod endpoints;
 
@@ -37,11 +38,14 @@ pub enum BlockFormat {
     Bc3,
     /// One channel: two 8-bit end points, 3-bit indices; unsigned.
     Bc4,
+    /// Colour and alpha together in one of eight modes, end points of up to 8 bits, indices of up to 4: the accurate
+    /// tier for colour, of the same size as BC3.
+    Bc7,
 }
 
 impl BlockFormat {
     /// Every format.
-    pub const ALL: [Self; 3] = [Self::Bc1, Self::Bc3, Self::Bc4];
+    pub const ALL: [Self; 4] = [Self::Bc1, Self::Bc3, Self::Bc4, Self::Bc7];
 
     /// The format's short name: `"bc3"`.
     pub fn name(self) -> &'static str {
@@ -49,6 +53,7 @@ impl BlockFormat {
             Self::Bc1 => "bc1",
             Self::Bc3 => "bc3",
             Self::Bc4 => "bc4",
+            Self::Bc7 => "bc7",
         }
     }
 
@@ -56,7 +61,7 @@ impl BlockFormat {
     pub fn block_bytes(self) -> usize {
         match self {
             Self::Bc1 | Self::Bc4 => 8,
-            Self::Bc3 => 16,
+            Self::Bc3 | Self::Bc7 => 16,
         }
     }
 
@@ -68,7 +73,7 @@ impl BlockFormat {
     /// Bytes of one voxel on the uncompressed side: 4 for colour, 1 for a scalar.
     pub fn channels(self) -> usize {
         match self {
-            Self::Bc1 | Self::Bc3 => 4,
+            Self::Bc1 | Self::Bc3 | Self::Bc7 => 4,
             Self::Bc4 => 1,
         }
     }
@@ -96,11 +101,11 @@ pub enum ColourWeight {
 }
 
 /// How much an encoder tries.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Level {
-    /// As fast as can be.
+    /// For a transfer function that is being changed: what costs little.
     Fast,
-    /// The best that is known.
+    /// For a volume that stays: all that is known to help.
     #[default]
     Best,
 }
@@ -111,7 +116,7 @@ pub enum Level {
 pub struct EncodeOptions {
     /// How voxels share in the colours of a BC3 block; of no effect in BC1, which is opaque, and BC4.
     pub colour_weight: ColourWeight,
-    /// How much is tried.
+    /// How much the encoder tries.
     pub level: Level,
 }
 
@@ -209,6 +214,11 @@ pub fn encode_volume_with(
             block::encode(samples, extent, &mut blocks, |texels| bc3::encode(texels, options.colour_weight));
         }
         BlockFormat::Bc4 => block::encode(samples, extent, &mut blocks, bc4::encode),
+        BlockFormat::Bc7 => {
+            block::encode_rows(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+                bc7::encode_row(rows, blocks, options);
+            });
+        }
     }
     Ok(blocks)
 }
@@ -233,6 +243,7 @@ pub fn decode_volume(format: BlockFormat, blocks: &[u8], extent: Extent3) -> Res
         BlockFormat::Bc1 => block::decode(blocks, extent, &mut samples, bc1::decode),
         BlockFormat::Bc3 => block::decode(blocks, extent, &mut samples, bc3::decode),
         BlockFormat::Bc4 => block::decode(blocks, extent, &mut samples, bc4::decode),
+        BlockFormat::Bc7 => block::decode(blocks, extent, &mut samples, bc7::decode),
     }
     Ok(samples)
 }
