@@ -10,11 +10,12 @@ use thiserror::Error;
 use super::{Case, Implant, Source, Volume};
 use crate::load::{self, Content, Item, Limits, LoadError, Note, Progress};
 use crate::sample;
+use crate::steps::Steps;
 
 /// What kind of data is wanted of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
-    /// A [`Grid`].
+    /// A [`Grid`], or [`Steps`] of them.
     Volume,
     /// A [`TriangleMesh`].
     Surface,
@@ -49,8 +50,21 @@ impl Key {
 pub enum Data {
     /// A volume.
     Grid(Arc<Grid>),
+    /// A volume over time.
+    Steps(Arc<Steps>),
     /// A surface.
     Mesh(Arc<TriangleMesh>),
+}
+
+impl Data {
+    /// Least and greatest value of a volume, over all its steps; none of a surface.
+    pub fn range(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Grid(grid) => Some(grid.range()),
+            Self::Steps(steps) => Some(steps.range()),
+            Self::Mesh(_) => None,
+        }
+    }
 }
 
 /// Data with what is known about them.
@@ -107,11 +121,20 @@ pub struct Assets {
 }
 
 impl Assets {
-    /// The samples of a volume, where loaded.
-    pub fn grid(&self, volume: &Volume) -> Option<&Arc<Grid>> {
+    /// The samples of a volume, where loaded; of one over time, those of the step that it shows.
+    pub fn grid(&self, volume: &Volume) -> Option<Arc<Grid>> {
         match &self.loaded.get(&Key::of_volume(volume))?.data {
-            Data::Grid(grid) => Some(grid),
+            Data::Grid(grid) => Some(Arc::clone(grid)),
+            Data::Steps(steps) => steps.grid(volume.step),
             Data::Mesh(_) => None,
+        }
+    }
+
+    /// The steps of a volume over time, where loaded; none of a volume that does not change.
+    pub fn steps(&self, volume: &Volume) -> Option<&Arc<Steps>> {
+        match &self.loaded.get(&Key::of_volume(volume))?.data {
+            Data::Steps(steps) => Some(steps),
+            Data::Grid(_) | Data::Mesh(_) => None,
         }
     }
 
@@ -119,7 +142,7 @@ impl Assets {
     pub fn mesh(&self, implant: &Implant) -> Option<&Arc<TriangleMesh>> {
         match &self.loaded.get(&Key::of_implant(implant))?.data {
             Data::Mesh(mesh) => Some(mesh),
-            Data::Grid(_) => None,
+            Data::Grid(_) | Data::Steps(_) => None,
         }
     }
 
@@ -232,10 +255,8 @@ fn number(source: &Source, items: Vec<Item>) -> Vec<Arc<Asset>> {
     for item in items {
         let (data, kind, count) = match item.content {
             Content::Volume(grid) => (Data::Grid(Arc::new(grid)), Kind::Volume, &mut volumes),
-            // A case shows one moment; a series counts as the volume of its first step.
             Content::Series(series) => {
-                let Some(first) = series.steps().first() else { continue };
-                (Data::Grid(Arc::clone(first)), Kind::Volume, &mut volumes)
+                (Data::Steps(Arc::new(Steps::in_memory(series))), Kind::Volume, &mut volumes)
             }
             Content::Mesh(mesh) => (Data::Mesh(Arc::new(mesh)), Kind::Surface, &mut surfaces),
             Content::Cells(_) => continue,

@@ -153,14 +153,14 @@ fn frame_chart(rows: &[Row]) -> Chart {
 fn textures(input: &Input, args: &BenchArgs) -> Result<Measured, Failure> {
     let path = args.data.as_deref().unwrap_or(Path::new("the built-in case"));
     let (volume, grid) = compress::volume(&input.case, &input.assets, path)?;
-    let extent = compress::extent(grid)?;
+    let extent = compress::extent(&grid)?;
     let mut rows = Vec::new();
     for threads in thread_counts() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| {
             Failure::Other(format!("the threads cannot be started ({e}); close other programs"))
         })?;
         for (format, plain) in FORMATS {
-            let make = |format| pool.install(|| compress::make(format, grid, &volume.transfer, extent));
+            let make = |format| pool.install(|| compress::make(format, &grid, &volume.transfer, extent));
             let mut made = make(format)?;
             let (mut generate, mut encode, mut uncompressed) = (Vec::new(), Vec::new(), Vec::new());
             for _ in 0..REPEATS {

@@ -77,6 +77,7 @@ pub fn run(args: &CompressArgs) -> Result<(), Failure> {
     check_folder(&args.out)?;
     let input = input::open(&args.input)?;
     let (volume, grid) = volume(&input.case, &input.assets, &args.input)?;
+    let grid = grid.as_ref();
     let transfer = transfer(args.preset.as_deref(), volume, grid)?;
     let threads = args.threads.map_or(0, usize::from);
     let pool = rayon::ThreadPoolBuilder::new()
@@ -149,9 +150,9 @@ fn numbers(values: &[f64]) -> String {
 /// The first visible volume of an input.
 pub(super) fn volume<'a>(
     case: &'a Case,
-    assets: &'a Assets,
+    assets: &Assets,
     path: &std::path::Path,
-) -> Result<(&'a Volume, &'a Arc<Grid>), Failure> {
+) -> Result<(&'a Volume, Arc<Grid>), Failure> {
     let mut visible = case.volumes.iter().filter(|v| v.visible);
     visible.find_map(|v| Some((v, assets.grid(v)?))).ok_or_else(|| {
         let fault = "there is no volume to take; choose a file with a volume, or make one visible";

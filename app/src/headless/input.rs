@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::{Failure, Terminal};
-use crate::case::assets::{self, Data};
+use crate::case::assets;
 use crate::case::{Assets, Case, Implant, Source, Volume, file};
 use crate::load::Limits;
 use crate::{presets, sample};
@@ -76,15 +76,15 @@ fn load(case: Case) -> Result<Input, Failure> {
 /// Adds data to a case as a volume or an implant of their own, with the defaults of their kind.
 fn case_of(case: &mut Case, asset: &assets::Asset) {
     let wish = asset.key.source.short_name();
-    match &asset.data {
-        Data::Grid(grid) => {
-            let transfer = presets::default_for(asset.modality.as_deref(), grid.range());
+    match asset.data.range() {
+        Some(range) => {
+            let transfer = presets::default_for(asset.modality.as_deref(), range);
             let id = case.free_volume_id(&wish);
             let mut volume = Volume::new(id, asset.key.source.clone(), Arc::new(transfer));
             volume.item = asset.key.item;
             case.volumes.push(volume);
         }
-        Data::Mesh(_) => {
+        None => {
             let mut implant = Implant::new(case.free_implant_id(&wish), asset.key.source.clone());
             implant.item = asset.key.item;
             case.implants.push(implant);

@@ -43,7 +43,7 @@ pub use table::{ColourPoint, ColourTable};
 pub use volume::{Samples, Volume};
 pub use window::Window;
 
-use crate::bc::{EncodeOptions, Level};
+use crate::bc::EncodeOptions;
 use crate::simd::Simd;
 use crate::{BlockFormat, bc};
 use bricks::SkipMap;
