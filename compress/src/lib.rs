@@ -30,9 +30,11 @@
 //! - *Doi*: the 4×4×4 work unit of [`bc`] follows Doi's encoder of volumes in DXT5 (BC3).
 
 pub mod bc;
+pub mod container;
 mod extent;
 pub mod ktx2;
 mod limits;
+pub mod lossless;
 pub mod pvtc;
 pub mod quality;
 mod simd;

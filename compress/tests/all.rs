@@ -7,3 +7,4 @@ mod ktx2_file;
 mod naive;
 mod phantom;
 mod pvtc;
+mod series;
