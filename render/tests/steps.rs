@@ -37,7 +37,7 @@ fn packed(format: PackedFormat, extent: [usize; 3], bytes: &Arc<Vec<u8>>, step: 
     let like = volume(TextureFormat::R16);
     let rescale = Rescale { slope: 6.0, intercept: -300.0 };
     let place = *like.grid.world_from_voxel();
-    PackedStep::new(format, extent, place, rescale, Arc::clone(bytes), step).unwrap()
+    PackedStep::new(format, extent, place, rescale, bytes.clone(), step).unwrap()
 }
 
 /// The volume of the pictures with a step in it, and its decoded samples for the reference.

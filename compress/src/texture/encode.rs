@@ -15,8 +15,8 @@ use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
 use super::{EncodeStats, Part};
-use crate::bc::{self, EncodeOptions, Level};
 use crate::BlockFormat;
+use crate::bc::{self, EncodeOptions, Level};
 use crate::simd::Simd;
 
 /// Voxels of a block along x, and along y.

@@ -12,6 +12,7 @@ mod encode;
 mod packed;
 mod plan;
 mod pvtc;
+mod source;
 
 use std::fmt;
 use std::sync::Arc;
@@ -20,6 +21,7 @@ pub use packed::StepDecoder;
 pub(crate) use plan::{Plan, TextureKey, is_colour};
 pub use pvtc::decode_on_device;
 pub(crate) use pvtc::gpu_data;
+pub use source::{GridSource, SourceError};
 
 use crate::gpu::{Gpu, GpuError};
 use crate::scene::TextureFormat;

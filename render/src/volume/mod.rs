@@ -25,7 +25,7 @@ pub use cells::CellGrid;
 pub use cutter::{Cutter, CutterError, Side};
 pub use grid::{Grid, GridError, Rescale, Samples};
 pub use mesh::{MeshError, TriangleMesh};
-pub use packed::{PackedError, PackedFormat, PackedStep};
+pub use packed::{PackedError, PackedFormat, PackedStep, SharedBytes};
 pub use series::{Series, SeriesError};
 pub use space::{Affine, Point, SpaceError, Vector};
 pub use transfer::{ControlPoint, Transfer, TransferError};

@@ -109,17 +109,28 @@ pub enum PackedError {
     },
 }
 
+/// Bytes that are shared: of a file, or of a stream that takes their memory back when nobody has them any longer.
+pub type SharedBytes = Arc<dyn AsRef<[u8]> + Send + Sync>;
+
 /// One step of a time series, compressed. A clone shares the bytes, and so do the steps that lie in them together.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct PackedStep {
     format: PackedFormat,
     extent: [usize; 3],
     world_from_voxel: Affine,
     rescale: Rescale,
-    bytes: Arc<Vec<u8>>,
+    bytes: SharedBytes,
     step: usize,
     max_error: f64,
     psnr_db: f64,
+}
+
+impl fmt::Debug for PackedStep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut debug = f.debug_struct("PackedStep");
+        debug.field("format", &self.format).field("extent", &self.extent).field("step", &self.step);
+        debug.finish_non_exhaustive()
+    }
 }
 
 impl PackedStep {
@@ -133,7 +144,7 @@ impl PackedStep {
         extent: [usize; 3],
         world_from_voxel: Affine,
         rescale: Rescale,
-        bytes: Arc<Vec<u8>>,
+        bytes: SharedBytes,
         step: usize,
     ) -> Result<Self, PackedError> {
         if let PackedFormat::Pvtc { s, t } = format
@@ -142,9 +153,10 @@ impl PackedStep {
             return Err(PackedError::Format { format });
         }
         let expected = format.len(extent);
-        if extent.contains(&0) || expected != Some(bytes.len()) {
+        let found = (*bytes).as_ref().len();
+        if extent.contains(&0) || expected != Some(found) {
             let expected = expected.map_or_else(|| "more than can be counted".to_owned(), |n| n.to_string());
-            return Err(PackedError::Length { format, expected, found: bytes.len() });
+            return Err(PackedError::Length { format, expected, found });
         }
         if step >= format.steps() {
             return Err(PackedError::Step { format, step });
@@ -180,8 +192,8 @@ impl PackedStep {
     }
 
     /// The compressed bytes.
-    pub fn bytes(&self) -> &Arc<Vec<u8>> {
-        &self.bytes
+    pub fn bytes(&self) -> &[u8] {
+        (*self.bytes).as_ref()
     }
 
     /// Which of the steps in the bytes this is, from 0.
@@ -217,7 +229,8 @@ impl PackedStep {
 
     /// Whether both lie in the same bytes, read in the same way.
     pub fn shares_bytes(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.bytes, &other.bytes) && (self.format, self.extent) == (other.format, other.extent)
+        Arc::as_ptr(&self.bytes).addr() == Arc::as_ptr(&other.bytes).addr()
+            && (self.format, self.extent) == (other.format, other.extent)
     }
 }
 

@@ -15,7 +15,10 @@ pub(super) fn show_ui(player: &mut Player, ctx: &mut ToolContext<'_>, ui: &mut U
     let chosen = |id: &Option<String>| moving.iter().find(|v| id.as_ref() == Some(&v.id)).copied();
     let volume = chosen(&player.volume).or_else(|| chosen(&ctx.selection.volume)).or(moving.first().copied());
     let Some((volume, steps)) = volume.and_then(|v| Some((v, ctx.assets.steps(v)?))) else {
-        theme::quiet_ui(ui, "No volume over time is shown. Open one: a 4D NIfTI or NRRD file, a DICOM series with");
+        theme::quiet_ui(
+            ui,
+            "No volume over time is shown. Open one: a 4D NIfTI or NRRD file, a DICOM series with",
+        );
         theme::quiet_ui(ui, "temporal positions, a folder of numbered volumes, or an .ovs file.");
         player.clock.stop();
         return;
@@ -88,7 +91,13 @@ fn buttons_ui(player: &mut Player, ui: &mut Ui, shown: usize, times: &[f64], now
         let clock = &mut player.clock;
         let (speed, direction) = clock.speed();
         let (mut new_speed, mut back) = (speed, direction == Direction::Backward);
-        ui.add(DragValue::new(&mut new_speed).range(SPEEDS[0]..=SPEEDS[1]).speed(0.02).prefix("speed ").suffix(" ×"));
+        ui.add(
+            DragValue::new(&mut new_speed)
+                .range(SPEEDS[0]..=SPEEDS[1])
+                .speed(0.02)
+                .prefix("speed ")
+                .suffix(" ×"),
+        );
         ui.checkbox(&mut back, "backwards");
         ui.checkbox(&mut clock.looped, "loop");
         let new_direction = if back { Direction::Backward } else { Direction::Forward };
@@ -100,7 +109,14 @@ fn buttons_ui(player: &mut Player, ui: &mut Ui, shown: usize, times: &[f64], now
 }
 
 /// Shows what is due if it is there, and asks for what comes next.
-fn play(player: &mut Player, ctx: &mut ToolContext<'_>, volume: &Volume, steps: &Steps, shown: usize, now_secs: f64) {
+fn play(
+    player: &mut Player,
+    ctx: &mut ToolContext<'_>,
+    volume: &Volume,
+    steps: &Steps,
+    shown: usize,
+    now_secs: f64,
+) {
     let times = steps.times_secs();
     let is_forward = player.clock.speed().1 == Direction::Forward;
     match player.clock.due(now_secs, shown, times) {
