@@ -37,6 +37,7 @@ mod limits;
 pub mod lossless;
 pub mod pvtc;
 pub mod quality;
+pub mod stream;
 
 pub use bc::BlockFormat;
 pub use extent::{Extent3, ExtentError};
