@@ -67,6 +67,7 @@
 mod decode;
 mod encode;
 mod ends;
+mod fit;
 pub mod packed;
 
 use std::fmt;
