@@ -38,6 +38,7 @@ pub mod lossless;
 pub mod pvtc;
 pub mod quality;
 mod simd;
+pub mod stream;
 pub mod texture;
 
 pub use bc::BlockFormat;

@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::{Case, Implant, Source, Volume};
 use crate::load::{self, Content, Item, Limits, LoadError, Note, Progress};
 use crate::sample;
-use crate::steps::Steps;
+use crate::steps::{self, SeriesFileError, Steps};
 
 /// What kind of data is wanted of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -91,6 +91,9 @@ pub enum AssetError {
     /// The loader's complaint.
     #[error(transparent)]
     Load(#[from] LoadError),
+    /// The series file's complaint.
+    #[error(transparent)]
+    Series(#[from] SeriesFileError),
     /// The source has no such item.
     #[error("holds {found} {kind}, so item {item} is not there; choose another file or item: {}", path.display())]
     NoItem {
@@ -232,6 +235,15 @@ pub fn open(
     progress: &dyn Progress,
 ) -> Result<Vec<Arc<Asset>>, AssetError> {
     match source {
+        Source::Path(path) if steps::is_series(path) => {
+            let steps = Steps::open(path, limits.decoded_bytes)?;
+            let (name, kind) = steps.title().unwrap_or_default();
+            let name = if name.is_empty() { source.short_name() } else { name.to_owned() };
+            let modality = Some(kind.to_owned()).filter(|kind| !kind.is_empty());
+            let key = Key { source: source.clone(), kind: Kind::Volume, item: 0 };
+            let data = Data::Steps(Arc::new(steps));
+            Ok(vec![Arc::new(Asset { key, name, format: "series", modality, data, notes: Vec::new() })])
+        }
         Source::Path(path) => Ok(number(source, load::open(path, limits, progress)?)),
         Source::Builtin(name) => {
             let (data, modality) = match name.as_str() {

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use compress::container::{Figures, FileWriter, Header, StepCodec, WriteError};
 use compress::lossless::{ByteCodec, PackOptions};
 use compress::pvtc::packed::{decode_packed_step, encode_packed};
-use compress::pvtc::{self, Encoder};
+use compress::pvtc::{self, Encoder, Layout};
 use compress::{Extent3, bc};
 use rayon::prelude::*;
 use render::volume::Grid;
@@ -28,6 +28,14 @@ pub struct SeriesOptions {
     pub encoder: Encoder,
     /// The second stage.
     pub byte_codec: ByteCodec,
+}
+
+impl Default for SeriesOptions {
+    /// PVTC <4,2>, fitted, with zstd.
+    fn default() -> Self {
+        let codec = Layout::new(4, 2).map_or(StepCodec::Raw8, StepCodec::Pvtc);
+        Self { codec, encoder: Encoder::Fitted, byte_codec: ByteCodec::Zstd }
+    }
 }
 
 /// What was made and what it cost.

@@ -173,7 +173,7 @@ mod tests {
         let extent = Extent3::new([4 * 150 + 3, 7, 11]).unwrap();
         for layout in Layout::ALL {
             let bytes: Vec<u8> =
-                (0..layout.encoded_len(extent) as u64).map(|i| (i * i * 0x9E37_79B9 >> 13) as u8).collect();
+                (0..layout.encoded_len(extent) as u64).map(|i| ((i * i * 0x9E37_79B9) >> 13) as u8).collect();
             let (heads, tables) = bytes.split_at(layout.head_len(extent));
             for at in 0..layout.t().into() {
                 let mut dispatched = vec![0; extent.voxels()];
