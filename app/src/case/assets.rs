@@ -107,7 +107,7 @@ pub enum AssetError {
         path: PathBuf,
     },
     /// No built-in data of that name.
-    #[error("there are no built-in data \"{name}\"; use builtin:hip/ct, builtin:hip/mri or builtin:hip/stem")]
+    #[error("there are no built-in data \"{name}\"; use builtin:hip/ct, builtin:hip/mri, builtin:hip/stem or builtin:beat")]
     NoBuiltin {
         /// As asked for.
         name: String,
@@ -250,9 +250,10 @@ pub fn open(
                 "hip/ct" => (Data::Grid(sample::ct()?), Some("CT")),
                 "hip/mri" => (Data::Grid(sample::mri()?), Some("MR")),
                 "hip/stem" => (Data::Mesh(sample::stem()?), None),
+                sample::BEAT => (Data::Steps(Arc::new(Steps::in_memory(sample::beat()?))), None),
                 _ => return Err(AssetError::NoBuiltin { name: name.clone() }),
             };
-            let kind = if matches!(data, Data::Grid(_)) { Kind::Volume } else { Kind::Surface };
+            let kind = if matches!(data, Data::Mesh(_)) { Kind::Surface } else { Kind::Volume };
             let key = Key { source: source.clone(), kind, item: 0 };
             let modality = modality.map(str::to_owned);
             let name = source.short_name();

@@ -33,17 +33,25 @@ pub fn open(path: &Path) -> Result<Input, Failure> {
         let case = file::load(path).map_err(Failure::Case)?;
         return load(case);
     }
-    let source = Source::path(path);
+    let input = of_source(Source::path(path))?;
+    if input.case.volumes.is_empty() && input.case.implants.is_empty() {
+        let fault = "the data hold no volume and no surface; choose a file that does";
+        return Err(Failure::Unfit(format!("{fault}: {}", path.display())));
+    }
+    Ok(input)
+}
+
+/// The data of a source as a case of their own.
+///
+/// # Errors
+/// [`Failure`]: data that cannot be used.
+pub fn of_source(source: Source) -> Result<Input, Failure> {
     let found = assets::open(&source, &Limits::default(), &Terminal::default())?;
     let mut assets = Assets::default();
     let mut case = Case { name: source.short_name(), ..Case::default() };
     for asset in found {
         case_of(&mut case, &asset);
         assets.insert(asset);
-    }
-    if case.volumes.is_empty() && case.implants.is_empty() {
-        let fault = "the data hold no volume and no surface; choose a file that does";
-        return Err(Failure::Unfit(format!("{fault}: {}", path.display())));
     }
     // Several series of one folder lie over each other: the largest is shown.
     let size = |v: &Volume| assets.grid(v).map_or(0, |g| g.samples().len());

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use render::volume::{Affine, Grid, Point, Rescale, Samples, Series, Vector};
 
 use super::SampleError;
-use super::noise::lattice;
+use super::noise;
 
 /// Voxels along each axis.
 const SIDE: usize = 96;
@@ -53,6 +53,7 @@ fn voxel(step: usize, at: [usize; 3]) -> u8 {
     let edge = |at: f64| 1.0 / (1.0 + ((r - at) * 60.0).exp());
     let (wall, pool) = (edge(outer) - edge(inner), edge(inner));
     let body = 35.0 + 20.0 * (3.0 * p[0] + 2.0 * p[1] + 0.3 * phase.sin()).sin() * (1.0 - edge(outer));
-    let noise = lattice(at.map(|i| i as i64), step as u64 + 1) * 6.0 - 3.0;
-    (body + 120.0 * wall + 185.0 * pool + noise).clamp(0.0, 255.0).round() as u8
+    let [x, y, z] = at.map(|i| i as i64);
+    let noise = 2.0 * noise::white(step as u64 + 1, x, y, z);
+    (body + 120.0 * wall + 185.0 * pool + f64::from(noise)).clamp(0.0, 255.0).round() as u8
 }

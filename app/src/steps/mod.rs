@@ -15,7 +15,7 @@ use compress::container::StepCodec;
 use render::volume::{Grid, PackedStep, Series};
 
 pub use file::{SeriesFileError, is_series};
-pub use packed::{format_of, packed_step};
+pub use packed::{StepError, format_of, packed_step};
 
 use file::SeriesFile;
 

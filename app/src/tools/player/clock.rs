@@ -1,7 +1,7 @@
 //! Which step is due: from the clock on the wall, the times of the steps, speed and direction. No window.
 
 /// Slowest and fastest playing, against the steps' own times.
-pub const SPEEDS: [f64; 2] = [0.05, 20.0];
+pub(super) const SPEEDS: [f64; 2] = [0.05, 20.0];
 
 /// Which way time runs.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
