@@ -92,7 +92,7 @@ impl<const C: usize> Colours<'_, C> {
                 }
             }
         }
-        let axis = principal_axis(covariance);
+        let axis = principal_axis::<C, 3>(covariance);
         let length = axis.iter().fold(Lanes::all(TINY), |length, &part| length + part * part);
         let share = Lanes::ONE.over(length);
         let (mut low, mut high) = (Lanes::ZERO, Lanes::ZERO);
@@ -148,14 +148,7 @@ impl<const C: usize> Colours<'_, C> {
     /// The nearest ends that can be stored: codes, lowest bits and decoded values.
     #[inline(always)]
     fn stored(&self, ends: [[Lanes; C]; 2], storage: Storage, importance: &[Lanes; C]) -> Line<C> {
-        let zero = [[Lanes::ZERO; C]; 2];
-        let mut line = Line {
-            codes: zero,
-            low: [Lanes::ZERO; 2],
-            values: zero,
-            places: [Lanes::ZERO; TEXELS],
-            error: Lanes::ZERO,
-        };
+        let mut line = Line::NONE;
         if storage.low_bits == LowBits::None {
             for (end, at) in ends.iter().zip(0..) {
                 for c in 0..C {
@@ -167,7 +160,7 @@ impl<const C: usize> Colours<'_, C> {
             return line;
         }
         let mut off = [[Lanes::ZERO; 2]; 2];
-        let mut tried = [(zero, zero); 2];
+        let mut tried = [([[Lanes::ZERO; C]; 2], [[Lanes::ZERO; C]; 2]); 2];
         for (low, (codes, values)) in tried.iter_mut().enumerate() {
             for at in 0..2 {
                 for c in 0..C {
@@ -236,6 +229,15 @@ impl<const C: usize> Colours<'_, C> {
 }
 
 impl<const C: usize> Line<C> {
+    /// No line yet.
+    pub(super) const NONE: Self = Self {
+        codes: [[Lanes::ZERO; C]; 2],
+        low: [Lanes::ZERO; 2],
+        values: [[Lanes::ZERO; C]; 2],
+        places: [Lanes::ZERO; TEXELS],
+        error: Lanes::ZERO,
+    };
+
     /// In each lane the line of the smaller error.
     #[inline(always)]
     fn or_better(&self, other: &Self) -> Self {
@@ -277,12 +279,14 @@ pub(super) fn sum(plane: &Plane) -> Lanes {
     plane.iter().fold(Lanes::ZERO, |sum, &lanes| sum + lanes)
 }
 
-/// The direction of the largest eigenvalue of a symmetric matrix, of any length; only the upper half is read. The
-/// eighth power of the matrix is nearly that eigenvector times itself, and its column of the largest diagonal is not
-/// orthogonal to it.
+/// The direction of the largest eigenvalue of a symmetric matrix, of any length; only the upper half is read. A high
+/// power of the matrix, the eighth by three squarings, is nearly that eigenvector times itself, and its column of the
+/// largest diagonal is not orthogonal to it.
 #[inline(always)]
-pub(super) fn principal_axis<const C: usize>(mut matrix: [[Lanes; C]; C]) -> [Lanes; C] {
-    for _ in 0..3 {
+pub(super) fn principal_axis<const C: usize, const SQUARINGS: usize>(
+    mut matrix: [[Lanes; C]; C],
+) -> [Lanes; C] {
+    for _ in 0..SQUARINGS {
         let mut trace = Lanes::all(TINY);
         for c in 0..C {
             trace += matrix[c][c];

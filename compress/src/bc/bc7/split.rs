@@ -82,7 +82,7 @@ fn off_line(sums: &[Lanes; SUMS]) -> Lanes {
             trace += covariance[a][b];
         }
     }
-    let axis = principal_axis(covariance);
+    let axis = principal_axis::<4, 2>(covariance);
     let (mut along, mut length) = (Lanes::ZERO, Lanes::all(1e-6));
     for a in 0..4 {
         let mut row = Lanes::ZERO;
