@@ -21,9 +21,11 @@
 mod bc1;
 mod bc3;
 mod bc4;
+mod bc5;
 mod bc7;
 mod block;
 mod endpoints;
+pub mod two_plane;
 
 use thiserror::Error;
 
@@ -38,6 +40,8 @@ pub enum BlockFormat {
     Bc3,
     /// One channel: two 8-bit end points, 3-bit indices; unsigned.
     Bc4,
+    /// Two channels, each as in BC4; see [`two_plane`] for one scalar in both.
+    Bc5,
     /// Colour and alpha together in one of eight modes, end points of up to 8 bits, indices of up to 4: the accurate
     /// tier for colour, of the same size as BC3.
     Bc7,
@@ -45,7 +49,7 @@ pub enum BlockFormat {
 
 impl BlockFormat {
     /// Every format.
-    pub const ALL: [Self; 4] = [Self::Bc1, Self::Bc3, Self::Bc4, Self::Bc7];
+    pub const ALL: [Self; 5] = [Self::Bc1, Self::Bc3, Self::Bc4, Self::Bc5, Self::Bc7];
 
     /// The format's short name: `"bc3"`.
     pub fn name(self) -> &'static str {
@@ -53,6 +57,7 @@ impl BlockFormat {
             Self::Bc1 => "bc1",
             Self::Bc3 => "bc3",
             Self::Bc4 => "bc4",
+            Self::Bc5 => "bc5",
             Self::Bc7 => "bc7",
         }
     }
@@ -61,7 +66,7 @@ impl BlockFormat {
     pub fn block_bytes(self) -> usize {
         match self {
             Self::Bc1 | Self::Bc4 => 8,
-            Self::Bc3 | Self::Bc7 => 16,
+            Self::Bc3 | Self::Bc5 | Self::Bc7 => 16,
         }
     }
 
@@ -70,10 +75,11 @@ impl BlockFormat {
         self.block_bytes() / 2
     }
 
-    /// Bytes of one voxel on the uncompressed side: 4 for colour, 1 for a scalar.
+    /// Bytes of one voxel on the uncompressed side: 4 for colour, 2 for two channels, 1 for a scalar.
     pub fn channels(self) -> usize {
         match self {
             Self::Bc1 | Self::Bc3 | Self::Bc7 => 4,
+            Self::Bc5 => 2,
             Self::Bc4 => 1,
         }
     }
@@ -214,8 +220,10 @@ pub fn encode_volume_with(
             block::encode(samples, extent, &mut blocks, |texels| bc3::encode(texels, options.colour_weight));
         }
         BlockFormat::Bc4 => block::encode(samples, extent, &mut blocks, bc4::encode),
+        BlockFormat::Bc5 => block::encode(samples, extent, &mut blocks, bc5::encode),
         BlockFormat::Bc7 => {
-            block::encode_rows(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+            let (voxels, _) = samples.as_chunks::<4>();
+            block::encode_rows(voxels, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
                 bc7::encode_row(rows, blocks, options);
             });
         }
@@ -243,6 +251,7 @@ pub fn decode_volume(format: BlockFormat, blocks: &[u8], extent: Extent3) -> Res
         BlockFormat::Bc1 => block::decode(blocks, extent, &mut samples, bc1::decode),
         BlockFormat::Bc3 => block::decode(blocks, extent, &mut samples, bc3::decode),
         BlockFormat::Bc4 => block::decode(blocks, extent, &mut samples, bc4::decode),
+        BlockFormat::Bc5 => block::decode(blocks, extent, &mut samples, bc5::decode),
         BlockFormat::Bc7 => block::decode(blocks, extent, &mut samples, bc7::decode),
     }
     Ok(samples)

@@ -12,6 +12,7 @@ use super::modes::LowBits;
 use super::pack::Content;
 use super::partitions::TWO;
 use super::split::patterns;
+use crate::bc::block::texels;
 use crate::bc::endpoints::TEXELS;
 use crate::bc::{ColourWeight, EncodeOptions, Level};
 
@@ -97,7 +98,7 @@ fn encode_row_plain(rows: [&[[u8; 4]]; EDGE], blocks: &mut [u8], options: Encode
         } else if first.is_due(all_read) {
             first.one_line(if best { ROUNDS } else { FAST_ROUNDS });
         } else if !all_read {
-            let texels = gather(rows, place);
+            let texels = texels(rows, place);
             if texels.iter().all(|texel| *texel == texels[0]) {
                 blocks[place] = Content::solid(texels[0]).pack();
             } else {
@@ -108,23 +109,6 @@ fn encode_row_plain(rows: [&[[u8; 4]]; EDGE], blocks: &mut [u8], options: Encode
             break;
         }
     }
-}
-
-/// The texels of one block. Past the end of a row its last voxel is repeated.
-#[inline(always)]
-fn gather(rows: [&[[u8; 4]]; EDGE], place: usize) -> [[u8; 4]; TEXELS] {
-    let mut texels = [[0; 4]; TEXELS];
-    for (texels, row) in texels.chunks_exact_mut(EDGE).zip(rows) {
-        let rest = &row[EDGE * place..];
-        if let Some(whole) = rest.first_chunk::<EDGE>() {
-            texels.copy_from_slice(whole);
-        } else {
-            for (i, texel) in texels.iter_mut().enumerate() {
-                *texel = rest[i.min(rest.len() - 1)];
-            }
-        }
-    }
-    texels
 }
 
 impl Batch {
