@@ -1,4 +1,4 @@
-//! BC1, BC3 and BC4: block textures that graphics hardware samples directly, here for volumes.
+//! BC1, BC3, BC4, BC5 and BC7: block textures that graphics hardware samples directly, here for volumes.
 //!
 //! **Order** is that of a *sliced* 3D texture, which Vulkan and WebGPU read: blocks of 4×4×1 voxels, block x
 //! fastest, then block y, then z. A volume of any extent is covered; where a block reaches over the far edge in x
@@ -7,16 +7,18 @@
 //! neighbours in z are alike; rows of units are spread over threads, and the bytes are the same for any number of
 //! threads.
 //!
-//! **Samples** are 4 bytes a voxel, R G B A, for [`BlockFormat::Bc1`] and [`BlockFormat::Bc3`], and 1 byte for
-//! [`BlockFormat::Bc4`]; `[x, y, z]`, x fastest. BC1 is written in its opaque mode of four colours, alpha is not
+//! **Samples** are 4 bytes a voxel, R G B A, for [`BlockFormat::Bc1`], [`BlockFormat::Bc3`] and [`BlockFormat::Bc7`],
+//! 2 bytes for [`BlockFormat::Bc5`], and 1 byte for [`BlockFormat::Bc4`]; `[x, y, z]`, x fastest. BC1 is written in its opaque mode of four colours, alpha is not
 //! kept; its decoder knows the other mode too, where index 3 is transparent black.
 //!
 //! **Rounding.** The standard gives the interpolated values as fractions; the decoders here round them to the
-//! nearest 8-bit value once, at the end. Hardware may differ by 1 or 2.
+//! nearest 8-bit value once, at the end. Hardware may differ by 1 or 2; in BC7 it may not, and does not.
 //!
-//! Parts: `block` gathers and scatters, `endpoints` holds the fits, `bc1`, `bc3`, `bc4` the bits of each format.
+//! Parts: `block` gathers and scatters, `endpoints` holds the fits, `bc1` to `bc7` the bits of each format;
+//! [`two_plane`] is the precise tier for one scalar, [`choose`] finds the format that serves a bound.
 //!
-//! Source: KDFS, chapters "S3TC Compressed Texture Image Formats" and "RGTC Compressed Texture Image Formats".
+//! Source: KDFS, chapters "S3TC Compressed Texture Image Formats", "RGTC Compressed Texture Image Formats" and "BPTC
+//! Compressed Texture Image Formats".
 
 mod bc1;
 mod bc3;
@@ -24,6 +26,7 @@ mod bc4;
 mod bc5;
 mod bc7;
 mod block;
+pub mod choose;
 mod endpoints;
 pub mod two_plane;
 
@@ -95,7 +98,7 @@ impl BlockFormat {
     }
 }
 
-/// How the voxels of a BC3 block share in the choice of its colours.
+/// How the voxels of a BC3 or BC7 block share in the choice of its colours.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum ColourWeight {
     /// By their alpha: a voxel that is not seen costs the seen ones nothing. For straight (not premultiplied)
@@ -120,9 +123,9 @@ pub enum Level {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct EncodeOptions {
-    /// How voxels share in the colours of a BC3 block; of no effect in BC1, which is opaque, and BC4.
+    /// How voxels share in the colours of a BC3 or BC7 block; of no effect in the other formats.
     pub colour_weight: ColourWeight,
-    /// How much the encoder tries.
+    /// How much the encoder tries; of effect in BC7.
     pub level: Level,
 }
 

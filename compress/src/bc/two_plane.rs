@@ -235,7 +235,31 @@ struct Fit {
 
 /// Encodes one block: values in coarse codes, [0, 255]; one residual code is `per_code` of them.
 fn encode(values: &[f32; TEXELS], per_code: f32) -> [u8; BLOCK_BYTES] {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        #[expect(unsafe_code, reason = "the same code with wider vectors, where the machine has them")]
+        // SAFETY: the machine has AVX2, as was just asked.
+        return unsafe { encode_avx2(values, per_code) };
+    }
+    encode_plain(values, per_code)
+}
+
+/// [`encode_plain`] compiled for AVX2.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn encode_avx2(values: &[f32; TEXELS], per_code: f32) -> [u8; BLOCK_BYTES] {
+    encode_plain(values, per_code)
+}
+
+/// [`encode`] on any machine.
+#[inline(always)]
+fn encode_plain(values: &[f32; TEXELS], per_code: f32) -> [u8; BLOCK_BYTES] {
     let (low, high) = range(values);
+    if low == high {
+        let coarse = ends(low, high);
+        let left = (low - if low - coarse[0] > 0.5 { coarse[1] } else { coarse[0] }) / per_code + 127.5;
+        return Fit::new(values, per_code, coarse, ends(left.floor(), left.ceil())).block();
+    }
     let step = (high - low) / 63.0;
     // Eight coarse values, each in the midst of its eight residuals: all 64 evenly spread.
     let even_coarse = ends(low + 3.5 * step, high - 3.5 * step);
@@ -257,12 +281,14 @@ fn encode(values: &[f32; TEXELS], per_code: f32) -> [u8; BLOCK_BYTES] {
 
 impl Fit {
     /// What the nearest coarse values leave.
+    #[inline(always)]
     fn nearest(values: &[f32; TEXELS], [low, high]: [f32; 2]) -> [f32; TEXELS] {
         let step = (high - low) / STEPS;
-        values.map(|value| value - (low + step * ((value - low) / step).round().clamp(0.0, STEPS)))
+        values.map(|value| value - (low + step * rounded(((value - low) / step).clamp(0.0, STEPS))))
     }
 
     /// Puts each value at the best of the 64 places of two palettes.
+    #[inline(always)]
     fn new(values: &[f32; TEXELS], per_code: f32, coarse: [f32; 2], residual: [f32; 2]) -> Self {
         let coarse_step = (coarse[1] - coarse[0]) / STEPS;
         let residual_step = (residual[1] - residual[0]) / STEPS * per_code;
@@ -273,8 +299,8 @@ impl Fit {
         for level in 0..LEVELS {
             let base = first + coarse_step * level as f32;
             for i in 0..TEXELS {
-                let exact = ((values[i] - base) * per_step).max(0.0).min(STEPS);
-                let place = (exact + ROUND) - ROUND;
+                let exact = ((values[i] - base) * per_step).clamp(0.0, STEPS);
+                let place = rounded(exact);
                 let off = base + place * residual_step - values[i];
                 let error = off * off;
                 let better = error < errors[i];
@@ -287,6 +313,7 @@ impl Fit {
     }
 
     /// The best of this fit and of rounds of least squares, of one palette given the other, then the other.
+    #[inline(always)]
     fn refined(self, values: &[f32; TEXELS], per_code: f32) -> Self {
         let (mut best, mut last) = (self, self);
         for _ in 0..ROUNDS {
@@ -312,6 +339,7 @@ impl Fit {
     }
 
     /// The bytes of the block.
+    #[inline(always)]
     fn block(&self) -> [u8; BLOCK_BYTES] {
         // By place from the lowest value: the index in a palette whose first end point is the highest.
         const INDICES: [u64; LEVELS] = [1, 7, 6, 5, 4, 3, 2, 0];
@@ -329,18 +357,27 @@ impl Fit {
 }
 
 /// The ends, in steps of [`STEPS`], that fit the values best where they are placed now; `None` if that defines none.
+#[inline(always)]
 fn fitted(values: &[f32; TEXELS], places: &[f32; TEXELS]) -> Option<[f32; 2]> {
     let (low, high) = LineFit::new(&places.map(|place| place / STEPS), &[1.0; TEXELS])?.ends(values);
     Some(ends(low, high))
 }
 
 /// Whole end points near two values, the first the smaller.
+#[inline(always)]
 fn ends(low: f32, high: f32) -> [f32; 2] {
-    let low = low.round().clamp(0.0, TOP - 1.0);
-    [low, high.round().clamp(low + 1.0, TOP)]
+    let low = rounded(low.clamp(0.0, TOP - 1.0));
+    [low, rounded(high.clamp(low + 1.0, TOP))]
+}
+
+/// To the nearest whole number, ties to even, without a call.
+#[inline(always)]
+fn rounded(value: f32) -> f32 {
+    (value + ROUND) - ROUND
 }
 
 /// The lowest and the highest value.
+#[inline(always)]
 fn range(values: &[f32; TEXELS]) -> (f32, f32) {
     values.iter().fold((f32::MAX, f32::MIN), |(low, high), &value| (low.min(value), high.max(value)))
 }
@@ -374,6 +411,19 @@ mod tests {
             // Besides the place: the coarse step is off by up to an eighth of its share of a code, and G's ends by half.
             let bound = span / 126.0 + 0.5 + per_code;
             assert!(off <= bound, "span {span}: {off} of {bound}");
+        }
+    }
+
+    #[test]
+    fn wider_vectors_make_the_same_bytes() {
+        let mut state = 1_u32;
+        for span in 0..=255_u16 {
+            let values: [f32; TEXELS] = std::array::from_fn(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (state >> 8) as f32 / 16_777_216.0 * f32::from(span)
+            });
+            let per_code = (255.0 * LEAST_RESIDUAL + 1.0) / TOP;
+            assert_eq!(encode(&values, per_code), encode_plain(&values, per_code), "{values:?}");
         }
     }
 

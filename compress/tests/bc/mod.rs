@@ -1,7 +1,11 @@
 //! The block formats against two independent decoders, against brute force, and on a volume like a CT.
 
+mod choose;
+mod two_plane;
+
 use compress::bc::{
-    ColourWeight, DecodeError, EncodeError, EncodeOptions, decode_volume, encode_volume, encode_volume_with,
+    ColourWeight, DecodeError, EncodeError, EncodeOptions, Level, decode_volume, encode_volume,
+    encode_volume_with,
 };
 use compress::{BlockFormat, Extent3, quality};
 
@@ -142,6 +146,22 @@ fn a_ct_like_volume_keeps_the_quality_of_the_best_known_encoders() {
     };
     let bc1 = channels(BlockFormat::Bc1, 0..3);
     let (bc3, alpha) = (channels(BlockFormat::Bc3, 0..3), channels(BlockFormat::Bc3, 3..4));
+    let bc7 = [Level::Fast, Level::Best].map(|level| {
+        let options = EncodeOptions::default().with_level(level).with_colour_weight(ColourWeight::Equal);
+        let blocks = encode_volume_with(BlockFormat::Bc7, &colour, extent, options).unwrap();
+        let back = decode_volume(BlockFormat::Bc7, &blocks, extent).unwrap();
+        [0..3, 3..4].map(|which| quality::compare_channels(&colour, &back, 4, which, 255.0).unwrap())
+    });
+    // Those of BC7 are what the tiers are for: near BC3's alpha and better colour at once, and 6 dB better colour.
+    for (name, quality, floor_db) in [
+        ("BC7 fast RGB", bc7[0][0], 43.0),
+        ("BC7 fast A", bc7[0][1], 37.0),
+        ("BC7 best RGB", bc7[1][0], 45.0),
+        ("BC7 best A", bc7[1][1], 44.0),
+    ] {
+        println!("{name}: {quality:?}");
+        assert!(quality.psnr_db >= floor_db, "{name}: {quality:?}");
+    }
     // The floors are what intel_tex_2 0.5.0 reaches on this very volume.
     for (name, quality, floor_db) in
         [("BC4", bc4, 51.08), ("BC1 RGB", bc1, 38.60), ("BC3 RGB", bc3, 38.60), ("BC3 A", alpha, 47.61)]

@@ -3,6 +3,7 @@
 //!
 //! The first line is the principal axis; each round moves the ends to the least squares of the places found, which is
 //! `endpoints::LineFit` for many blocks. Errors are those of the values that a decoder gives back, to the last bit.
+#![expect(clippy::needless_range_loop, reason = "lanes, texels and matrices are indexed as in the formulas")]
 
 use super::lanes::Lanes;
 use super::modes::LowBits;
@@ -51,11 +52,11 @@ impl<const C: usize> Colours<'_, C> {
     #[inline(always)]
     pub(super) fn line(&self, storage: Storage, rounds: usize) -> Line<C> {
         let importance = self.importance();
-        let mut best = self.placed(storage, self.stored(self.principal_ends(), storage, &importance));
+        let mut best = self.placed(storage, stored(self.principal_ends(), storage, &importance));
         let mut last = best;
         for _ in 0..rounds {
             let ends = self.least_squares(&last, storage);
-            last = self.placed(storage, self.stored(ends, storage, &importance));
+            last = self.placed(storage, stored(ends, storage, &importance));
             best = best.or_better(&last);
         }
         best
@@ -145,51 +146,6 @@ impl<const C: usize> Colours<'_, C> {
         ends
     }
 
-    /// The nearest ends that can be stored: codes, lowest bits and decoded values.
-    #[inline(always)]
-    fn stored(&self, ends: [[Lanes; C]; 2], storage: Storage, importance: &[Lanes; C]) -> Line<C> {
-        let mut line = Line::NONE;
-        if storage.low_bits == LowBits::None {
-            for (end, at) in ends.iter().zip(0..) {
-                for c in 0..C {
-                    let code = (end[c].clamped(255.0) * (top(storage.bits) / 255.0)).rounded();
-                    line.codes[at][c] = code;
-                    line.values[at][c] = widened(code, storage.bits);
-                }
-            }
-            return line;
-        }
-        let mut off = [[Lanes::ZERO; 2]; 2];
-        let mut tried = [([[Lanes::ZERO; C]; 2], [[Lanes::ZERO; C]; 2]); 2];
-        for (low, (codes, values)) in tried.iter_mut().enumerate() {
-            for at in 0..2 {
-                for c in 0..C {
-                    let exact = ends[at][c].clamped(255.0) * (top(storage.bits + 1) / 255.0);
-                    let code = ((exact - Lanes::all(low as f32)) * 0.5).rounded().clamped(top(storage.bits));
-                    codes[at][c] = code;
-                    values[at][c] = widened(code * 2.0 + Lanes::all(low as f32), storage.bits + 1);
-                    let error = values[at][c] - ends[at][c];
-                    off[low][at] += error * error * importance[c];
-                }
-            }
-        }
-        if storage.low_bits == LowBits::EachSubset {
-            for off in &mut off {
-                *off = [off[0] + off[1]; 2];
-            }
-        }
-        let [(codes_0, values_0), (codes_1, values_1)] = tried;
-        for at in 0..2 {
-            let pick = |one: Lanes, zero: Lanes| off[1][at].less(off[0][at], one, zero);
-            line.low[at] = pick(Lanes::ONE, Lanes::ZERO);
-            for c in 0..C {
-                line.codes[at][c] = pick(codes_1[at][c], codes_0[at][c]);
-                line.values[at][c] = pick(values_1[at][c], values_0[at][c]);
-            }
-        }
-        line
-    }
-
     /// The line with each texel at the better of the two places beside it.
     #[inline(always)]
     fn placed(&self, storage: Storage, mut line: Line<C>) -> Line<C> {
@@ -256,6 +212,51 @@ impl<const C: usize> Line<C> {
         best.error = other.error.min(self.error);
         best
     }
+}
+
+/// The nearest ends that can be stored: codes, lowest bits and decoded values.
+#[inline(always)]
+fn stored<const C: usize>(ends: [[Lanes; C]; 2], storage: Storage, importance: &[Lanes; C]) -> Line<C> {
+    let mut line = Line::NONE;
+    if storage.low_bits == LowBits::None {
+        for (end, at) in ends.iter().zip(0..) {
+            for c in 0..C {
+                let code = (end[c].clamped(255.0) * (top(storage.bits) / 255.0)).rounded();
+                line.codes[at][c] = code;
+                line.values[at][c] = widened(code, storage.bits);
+            }
+        }
+        return line;
+    }
+    let mut off = [[Lanes::ZERO; 2]; 2];
+    let mut tried = [([[Lanes::ZERO; C]; 2], [[Lanes::ZERO; C]; 2]); 2];
+    for (low, (codes, values)) in tried.iter_mut().enumerate() {
+        for at in 0..2 {
+            for c in 0..C {
+                let exact = ends[at][c].clamped(255.0) * (top(storage.bits + 1) / 255.0);
+                let code = ((exact - Lanes::all(low as f32)) * 0.5).rounded().clamped(top(storage.bits));
+                codes[at][c] = code;
+                values[at][c] = widened(code * 2.0 + Lanes::all(low as f32), storage.bits + 1);
+                let error = values[at][c] - ends[at][c];
+                off[low][at] += error * error * importance[c];
+            }
+        }
+    }
+    if storage.low_bits == LowBits::EachSubset {
+        for off in &mut off {
+            *off = [off[0] + off[1]; 2];
+        }
+    }
+    let [(codes_0, values_0), (codes_1, values_1)] = tried;
+    for at in 0..2 {
+        let pick = |one: Lanes, zero: Lanes| off[1][at].less(off[0][at], one, zero);
+        line.low[at] = pick(Lanes::ONE, Lanes::ZERO);
+        for c in 0..C {
+            line.codes[at][c] = pick(codes_1[at][c], codes_0[at][c]);
+            line.values[at][c] = pick(values_1[at][c], values_0[at][c]);
+        }
+    }
+    line
 }
 
 /// The largest number of so many bits.

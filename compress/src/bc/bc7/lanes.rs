@@ -3,6 +3,7 @@
 //! Every operation is done in each lane alone, in `f32`, never fused: so a block's result depends neither on its
 //! neighbours in the batch nor on the width of the machine's vectors. The loops are plain; the compiler makes vector
 //! instructions of them.
+#![expect(clippy::needless_range_loop, reason = "lanes are indexed alike in all operands")]
 
 use std::ops::{Add, AddAssign, Mul, Sub};
 
