@@ -14,7 +14,7 @@
 //! **Rounding.** The standard gives the interpolated values as fractions; the decoders here round them to the
 //! nearest 8-bit value once, at the end. Hardware may differ by 1 or 2; in BC7 it may not, and does not.
 //!
-//! Parts: `block` gathers and scatters, `endpoints` holds the fits, `bc1` to `bc7` the bits of each format;
+//! Parts: `block` gathers and scatters, `endpoints` holds the fits, `lanes` eight blocks side by side, `bc1` to `bc7` the bits of each format;
 //! [`two_plane`] is the precise tier for one scalar, [`choose`] finds the format that serves a bound.
 //!
 //! Source: KDFS, chapters "S3TC Compressed Texture Image Formats", "RGTC Compressed Texture Image Formats" and "BPTC
@@ -28,6 +28,7 @@ mod bc7;
 mod block;
 pub mod choose;
 mod endpoints;
+mod lanes;
 pub mod two_plane;
 
 use thiserror::Error;

@@ -7,14 +7,14 @@
 //! opaque hardly ever.
 #![expect(clippy::needless_range_loop, reason = "lanes, texels and matrices are indexed as in the formulas")]
 
-use super::fit::{Colours, Line, Plane, Storage};
-use super::lanes::{LANES, Lanes};
+use super::fit::{Colours, Line, Storage};
 use super::modes::LowBits;
 use super::pack::Content;
 use super::partitions::TWO;
 use super::split::patterns;
 use crate::bc::block::texels;
 use crate::bc::endpoints::TEXELS;
+use crate::bc::lanes::{LANES, Lanes, Plane};
 use crate::bc::{ColourWeight, EncodeOptions, Level};
 
 /// Voxels of a block in x.

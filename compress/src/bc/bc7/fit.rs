@@ -1,16 +1,12 @@
 //! A line of colours through some texels of eight blocks at once: end points as a mode can store them, and where each
 //! texel is put between them.
 //!
-//! The first line is the principal axis; each round moves the ends to the least squares of the places found, which is
-//! `endpoints::LineFit` for many blocks. Errors are those of the values that a decoder gives back, to the last bit.
+//! The first line is the principal axis; each round moves the ends to the least squares of the places found. Errors are those of the values that a decoder gives back, to the last bit.
 #![expect(clippy::needless_range_loop, reason = "lanes, texels and matrices are indexed as in the formulas")]
 
-use super::lanes::Lanes;
 use super::modes::LowBits;
 use crate::bc::endpoints::TEXELS;
-
-/// One number for each texel of each block.
-pub(super) type Plane = [Lanes; TEXELS];
+use crate::bc::lanes::{Lanes, Plane, least_squares, sum};
 
 /// A positive number that no sum of weights is below, unless nothing is in it.
 const TINY: f32 = 1e-6;
@@ -119,29 +115,11 @@ impl<const C: usize> Colours<'_, C> {
     /// The ends that fit the values best where the texels are placed now.
     #[inline(always)]
     fn least_squares(&self, line: &Line<C>, storage: Storage) -> [[Lanes; C]; 2] {
-        let per_step = 1.0 / storage.steps;
         let mut ends = line.values;
         for c in 0..C {
-            let (mut aa, mut ab, mut bb) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
-            let (mut a, mut b) = (Lanes::ZERO, Lanes::ZERO);
-            for i in 0..TEXELS {
-                let far = line.places[i] * per_step;
-                let near = Lanes::ONE - far;
-                let (near_weight, far_weight) = (self.weights[c][i] * near, self.weights[c][i] * far);
-                aa += near_weight * near;
-                ab += near_weight * far;
-                bb += far_weight * far;
-                a += near_weight * self.values[c][i];
-                b += far_weight * self.values[c][i];
-            }
-            let determinant = aa * bb - ab * ab;
-            // Below this the two ends are not told apart by the data: they stay.
-            let least = aa.max(bb) * aa.max(bb) * 1e-4 + Lanes::all(TINY * TINY);
-            let share = Lanes::ONE.over(determinant.max(least));
-            let fitted = [(bb * a - ab * b) * share, (aa * b - ab * a) * share];
-            for (end, fitted) in ends.iter_mut().zip(fitted) {
-                end[c] = least.less(determinant, fitted.clamped(255.0), end[c]);
-            }
+            let last = [ends[0][c], ends[1][c]];
+            [ends[0][c], ends[1][c]] =
+                least_squares(self.values[c], self.weights[c], &line.places, storage.steps, last);
         }
         ends
     }
@@ -272,12 +250,6 @@ fn widened(code: Lanes, bits: u32) -> Lanes {
     // ⌊code / unit⌋, ties kept away.
     let repeated = (code * (1.0 / unit) - Lanes::all(0.5 - 0.5 / unit)).rounded();
     code * (1 << (8 - bits)) as f32 + repeated
-}
-
-/// The sum of a plane.
-#[inline(always)]
-pub(super) fn sum(plane: &Plane) -> Lanes {
-    plane.iter().fold(Lanes::ZERO, |sum, &lanes| sum + lanes)
 }
 
 /// The direction of the largest eigenvalue of a symmetric matrix, of any length; only the upper half is read. A high
