@@ -8,6 +8,8 @@
 //! | [`BlockFormat::Bc1`] | 4×4×1 voxels in 8 bytes | 4 | no | R, G, B (opaque) | encoder and decoder |
 //! | [`BlockFormat::Bc3`] | 4×4×1 voxels in 16 bytes | 8 | no | R, G, B, A | encoder and decoder |
 //! | [`BlockFormat::Bc4`] | 4×4×1 voxels in 8 bytes | 4 | no | one, 8-bit | encoder and decoder |
+//! | [`BlockFormat::Bc5`] | 4×4×1 voxels in 16 bytes | 8 | no | two, 8-bit, or one in [two planes](bc::two_plane) | encoder and decoder |
+//! | [`BlockFormat::Bc7`] | 4×4×1 voxels in 16 bytes | 8 | no | R, G, B, A | encoder and decoder |
 //! | [`pvtc`] <S, T> | 4×4×S voxels, T steps in 4 + 4·S bytes | 8·(4 + 4·S)/(16·S·T) | no | one, 8-bit, over time | encoders and decoder |
 //! | [`pvtc::packed`], TE and SE | 4×4×1 texels, three samples each, in 8 bytes | 4/3 | no | one, 8-bit, over time | encoder and decoder |
 //! | [`ktx2`], zstd inside | the whole level | by content | yes | those of its format | writer and reader |
@@ -19,8 +21,8 @@
 //!
 //! # References
 //! - *KDFS*: The Khronos Group, "Khronos Data Format Specification", version 1.4. Chapter "S3TC Compressed Texture
-//!   Image Formats" defines BC1 and BC3, chapter "RGTC Compressed Texture Image Formats" BC4; the data format
-//!   descriptor of a KTX2 file is defined there too.
+//!   Image Formats" defines BC1 and BC3, chapter "RGTC Compressed Texture Image Formats" BC4 and BC5,
+//!   chapter "BPTC Compressed Texture Image Formats" BC7; the data format descriptor of a KTX2 file is defined there too.
 //! - *KTX2*: The Khronos Group, "KTX File Format Specification", version 2.0, document revision 4.
 //! - *RFC 8878*: Y. Collet, M. Kucherawy, "Zstandard Compression and the 'application/zstd' Media Type", 2021.
 //! - *Yamada*: M. Yamada, F. Ino, K. Hagihara, "Lossy Compression Method for Controlling Rendering Speed of

@@ -48,21 +48,45 @@ pub(super) fn encode<const N: usize, const BYTES: usize>(
     });
 }
 
-/// Encodes all blocks of a volume by whole rows: four rows of voxels, the last repeated past the far edge in y.
-pub(super) fn encode_rows<const N: usize>(
-    samples: &[u8],
+/// Encodes all blocks of a volume by whole rows: each has four rows of voxels.
+pub(super) fn encode_rows<V: Sync>(
+    voxels: &[V],
     extent: Extent3,
     blocks: &mut [u8],
     block_bytes: usize,
-    encode_row: impl Fn([&[[u8; N]]; EDGE], &mut [u8]) + Sync,
+    encode_row: impl Fn([&[V]; EDGE], &mut [u8]) + Sync,
 ) {
-    let (voxels, _) = samples.as_chunks::<N>();
-    let [blocks_x, blocks_y, _] = extent.blocks();
-    blocks.par_chunks_mut(blocks_x * block_bytes).enumerate().for_each(|(row, blocks)| {
-        let (z, block_y) = (row / blocks_y, row % blocks_y);
-        let line = |j: usize| z * extent.y() + (block_y * EDGE + j).min(extent.y() - 1);
-        encode_row([0, 1, 2, 3].map(|j| &voxels[line(j) * extent.x()..][..extent.x()]), blocks);
+    let row_bytes = extent.blocks()[0] * block_bytes;
+    blocks.par_chunks_mut(row_bytes).enumerate().for_each(|(row, blocks)| {
+        encode_row(rows(voxels, extent, row), blocks);
     });
+}
+
+/// The four rows of voxels of a row of blocks, counted over all slices. Past the far edge in y the last is repeated.
+pub(super) fn rows<V>(voxels: &[V], extent: Extent3, row: usize) -> [&[V]; EDGE] {
+    let [_, blocks_y, _] = extent.blocks();
+    let (z, block_y) = (row / blocks_y, row % blocks_y);
+    [0, 1, 2, 3].map(|j| {
+        let line = z * extent.y() + (block_y * EDGE + j).min(extent.y() - 1);
+        &voxels[line * extent.x()..][..extent.x()]
+    })
+}
+
+/// The voxels of block `x` of a row of blocks. Past the far edge in x the last is repeated.
+#[inline(always)]
+pub(super) fn texels<V: Copy>(rows: [&[V]; EDGE], x: usize) -> [V; EDGE * EDGE] {
+    let mut texels = [rows[0][0]; EDGE * EDGE];
+    for (texels, row) in texels.chunks_exact_mut(EDGE).zip(rows) {
+        let rest = &row[EDGE * x..];
+        if let Some(whole) = rest.first_chunk::<EDGE>() {
+            texels.copy_from_slice(whole);
+        } else {
+            for (i, texel) in texels.iter_mut().enumerate() {
+                *texel = rest[i.min(rest.len() - 1)];
+            }
+        }
+    }
+    texels
 }
 
 /// Decodes all blocks of a volume. `blocks` and `samples` have the lengths of the extent.
@@ -72,9 +96,18 @@ pub(super) fn decode<const N: usize, const BYTES: usize>(
     samples: &mut [u8],
     decode_block: impl Fn([u8; BYTES]) -> Texels<N> + Sync,
 ) {
+    decode_to(blocks, extent, samples.as_chunks_mut::<N>().0, decode_block);
+}
+
+/// [`decode`] to voxels of any type.
+pub(super) fn decode_to<V: Copy + Send, const BYTES: usize>(
+    blocks: &[u8],
+    extent: Extent3,
+    voxels: &mut [V],
+    decode_block: impl Fn([u8; BYTES]) -> [V; EDGE * EDGE] + Sync,
+) {
     let [blocks_x, blocks_y, _] = extent.blocks();
     let (blocks, _) = blocks.as_chunks::<BYTES>();
-    let (voxels, _) = samples.as_chunks_mut::<N>();
     voxels.par_chunks_mut(extent.x() * extent.y()).enumerate().for_each(|(z, slice)| {
         let blocks = &blocks[z * blocks_x * blocks_y..];
         for (block_y, rows) in slice.chunks_mut(extent.x() * EDGE).enumerate() {
@@ -126,7 +159,7 @@ fn gather<const N: usize>(voxels: &[[u8; N]], extent: Extent3, block: [usize; 3]
 }
 
 /// Writes the voxels of a block that lie inside the volume; `rows` begins at the block's first row.
-fn scatter<const N: usize>(texels: &Texels<N>, rows: &mut [[u8; N]], row_len: usize, block_x: usize) {
+fn scatter<V: Copy>(texels: &[V; EDGE * EDGE], rows: &mut [V], row_len: usize, block_x: usize) {
     let x = block_x * EDGE;
     let width = EDGE.min(row_len - x);
     for (row, texels) in rows.chunks_mut(row_len).zip(texels.chunks_exact(EDGE)) {

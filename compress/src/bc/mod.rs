@@ -1,4 +1,4 @@
-//! BC1, BC3 and BC4: block textures that graphics hardware samples directly, here for volumes.
+//! BC1, BC3, BC4, BC5 and BC7: block textures that graphics hardware samples directly, here for volumes.
 //!
 //! **Order** is that of a *sliced* 3D texture, which Vulkan and WebGPU read: blocks of 4×4×1 voxels, block x
 //! fastest, then block y, then z. A volume of any extent is covered; where a block reaches over the far edge in x
@@ -7,23 +7,29 @@
 //! neighbours in z are alike; rows of units are spread over threads, and the bytes are the same for any number of
 //! threads.
 //!
-//! **Samples** are 4 bytes a voxel, R G B A, for [`BlockFormat::Bc1`] and [`BlockFormat::Bc3`], and 1 byte for
-//! [`BlockFormat::Bc4`]; `[x, y, z]`, x fastest. BC1 is written in its opaque mode of four colours, alpha is not
+//! **Samples** are 4 bytes a voxel, R G B A, for [`BlockFormat::Bc1`], [`BlockFormat::Bc3`] and [`BlockFormat::Bc7`],
+//! 2 bytes for [`BlockFormat::Bc5`], and 1 byte for [`BlockFormat::Bc4`]; `[x, y, z]`, x fastest. BC1 is written in its opaque mode of four colours, alpha is not
 //! kept; its decoder knows the other mode too, where index 3 is transparent black.
 //!
 //! **Rounding.** The standard gives the interpolated values as fractions; the decoders here round them to the
-//! nearest 8-bit value once, at the end. Hardware may differ by 1 or 2.
+//! nearest 8-bit value once, at the end. Hardware may differ by 1 or 2; in BC7 it may not, and does not.
 //!
-//! Parts: `block` gathers and scatters, `endpoints` holds the fits, `bc1`, `bc3`, `bc4` the bits of each format.
+//! Parts: `block` gathers and scatters, `endpoints` holds the fits, `lanes` eight blocks side by side, `bc1` to `bc7` the bits of each format;
+//! [`two_plane`] is the precise tier for one scalar, [`choose`] finds the format that serves a bound.
 //!
-//! Source: KDFS, chapters "S3TC Compressed Texture Image Formats" and "RGTC Compressed Texture Image Formats".
+//! Source: KDFS, chapters "S3TC Compressed Texture Image Formats", "RGTC Compressed Texture Image Formats" and "BPTC
+//! Compressed Texture Image Formats".
 
 mod bc1;
 mod bc3;
 mod bc4;
+mod bc5;
 mod bc7;
 mod block;
+pub mod choose;
 mod endpoints;
+mod lanes;
+pub mod two_plane;
 
 use thiserror::Error;
 
@@ -38,6 +44,8 @@ pub enum BlockFormat {
     Bc3,
     /// One channel: two 8-bit end points, 3-bit indices; unsigned.
     Bc4,
+    /// Two channels, each as in BC4; see [`two_plane`] for one scalar in both.
+    Bc5,
     /// Colour and alpha together in one of eight modes, end points of up to 8 bits, indices of up to 4: the accurate
     /// tier for colour, of the same size as BC3.
     Bc7,
@@ -45,7 +53,7 @@ pub enum BlockFormat {
 
 impl BlockFormat {
     /// Every format.
-    pub const ALL: [Self; 4] = [Self::Bc1, Self::Bc3, Self::Bc4, Self::Bc7];
+    pub const ALL: [Self; 5] = [Self::Bc1, Self::Bc3, Self::Bc4, Self::Bc5, Self::Bc7];
 
     /// The format's short name: `"bc3"`.
     pub fn name(self) -> &'static str {
@@ -53,6 +61,7 @@ impl BlockFormat {
             Self::Bc1 => "bc1",
             Self::Bc3 => "bc3",
             Self::Bc4 => "bc4",
+            Self::Bc5 => "bc5",
             Self::Bc7 => "bc7",
         }
     }
@@ -61,7 +70,7 @@ impl BlockFormat {
     pub fn block_bytes(self) -> usize {
         match self {
             Self::Bc1 | Self::Bc4 => 8,
-            Self::Bc3 | Self::Bc7 => 16,
+            Self::Bc3 | Self::Bc5 | Self::Bc7 => 16,
         }
     }
 
@@ -70,10 +79,11 @@ impl BlockFormat {
         self.block_bytes() / 2
     }
 
-    /// Bytes of one voxel on the uncompressed side: 4 for colour, 1 for a scalar.
+    /// Bytes of one voxel on the uncompressed side: 4 for colour, 2 for two channels, 1 for a scalar.
     pub fn channels(self) -> usize {
         match self {
             Self::Bc1 | Self::Bc3 | Self::Bc7 => 4,
+            Self::Bc5 => 2,
             Self::Bc4 => 1,
         }
     }
@@ -89,7 +99,7 @@ impl BlockFormat {
     }
 }
 
-/// How the voxels of a BC3 block share in the choice of its colours.
+/// How the voxels of a BC3 or BC7 block share in the choice of its colours.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum ColourWeight {
     /// By their alpha: a voxel that is not seen costs the seen ones nothing. For straight (not premultiplied)
@@ -114,9 +124,9 @@ pub enum Level {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct EncodeOptions {
-    /// How voxels share in the colours of a BC3 block; of no effect in BC1, which is opaque, and BC4.
+    /// How voxels share in the colours of a BC3 or BC7 block; of no effect in the other formats.
     pub colour_weight: ColourWeight,
-    /// How much the encoder tries.
+    /// How much the encoder tries; of effect in BC7.
     pub level: Level,
 }
 
@@ -214,8 +224,10 @@ pub fn encode_volume_with(
             block::encode(samples, extent, &mut blocks, |texels| bc3::encode(texels, options.colour_weight));
         }
         BlockFormat::Bc4 => block::encode(samples, extent, &mut blocks, bc4::encode),
+        BlockFormat::Bc5 => block::encode(samples, extent, &mut blocks, bc5::encode),
         BlockFormat::Bc7 => {
-            block::encode_rows(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+            let (voxels, _) = samples.as_chunks::<4>();
+            block::encode_rows(voxels, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
                 bc7::encode_row(rows, blocks, options);
             });
         }
@@ -243,6 +255,7 @@ pub fn decode_volume(format: BlockFormat, blocks: &[u8], extent: Extent3) -> Res
         BlockFormat::Bc1 => block::decode(blocks, extent, &mut samples, bc1::decode),
         BlockFormat::Bc3 => block::decode(blocks, extent, &mut samples, bc3::decode),
         BlockFormat::Bc4 => block::decode(blocks, extent, &mut samples, bc4::decode),
+        BlockFormat::Bc5 => block::decode(blocks, extent, &mut samples, bc5::decode),
         BlockFormat::Bc7 => block::decode(blocks, extent, &mut samples, bc7::decode),
     }
     Ok(samples)

@@ -86,6 +86,8 @@ fn layout(format: TextureFormat) -> (u8, u8, Vec<Sample>) {
         TextureFormat::Block(BlockFormat::Bc3) => (130, 4, vec![block(0, ALPHA), block(64, 0)]),
         // KHR_DF_MODEL_BC4
         TextureFormat::Block(BlockFormat::Bc4) => (131, 4, vec![block(0, 0)]),
+        // KHR_DF_MODEL_BC5: red, then green.
+        TextureFormat::Block(BlockFormat::Bc5) => (132, 4, vec![block(0, 0), block(64, 1)]),
         // KHR_DF_MODEL_BC7
         TextureFormat::Block(BlockFormat::Bc7) => (134, 4, vec![whole]),
         // KHR_DF_MODEL_RGBSDA: red 0, green 1, blue 2.

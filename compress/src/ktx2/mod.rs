@@ -31,6 +31,10 @@ pub const KEY_WORLD_FROM_VOXEL: &str = "osteotome.worldFromVoxel";
 /// Key of the values that the stored 0 and 1 stand for (HU in a CT): two numbers, as text with a space between.
 pub const KEY_RANGE: &str = "osteotome.range";
 
+/// Key of what the two planes of a BC5 texture stand for: offset, coarse and residual of
+/// [`Scales`](crate::bc::two_plane::Scales), three numbers as text with spaces between.
+pub const KEY_PLANES: &str = "osteotome.planes";
+
 /// Key of the program that wrote the file: text. The standard's own.
 pub const KEY_WRITER: &str = "KTXwriter";
 
@@ -62,10 +66,11 @@ pub enum TextureFormat {
 
 impl TextureFormat {
     /// Every format.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Block(BlockFormat::Bc1),
         Self::Block(BlockFormat::Bc3),
         Self::Block(BlockFormat::Bc4),
+        Self::Block(BlockFormat::Bc5),
         Self::Block(BlockFormat::Bc7),
         Self::R8,
         Self::R16,
@@ -78,6 +83,7 @@ impl TextureFormat {
             Self::Block(BlockFormat::Bc1) => 133, // VK_FORMAT_BC1_RGBA_UNORM_BLOCK
             Self::Block(BlockFormat::Bc3) => 137, // VK_FORMAT_BC3_UNORM_BLOCK
             Self::Block(BlockFormat::Bc4) => 139, // VK_FORMAT_BC4_UNORM_BLOCK
+            Self::Block(BlockFormat::Bc5) => 141, // VK_FORMAT_BC5_UNORM_BLOCK
             Self::Block(BlockFormat::Bc7) => 145, // VK_FORMAT_BC7_UNORM_BLOCK
             Self::R8 => 9,                        // VK_FORMAT_R8_UNORM
             Self::R16 => 70,                      // VK_FORMAT_R16_UNORM

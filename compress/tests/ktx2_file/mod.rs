@@ -1,6 +1,7 @@
 //! KTX2 files as others see them: read by an independent crate, and broken in every byte.
 
 use compress::bc::encode_volume;
+use compress::bc::two_plane::encode_two_planes;
 use compress::ktx2::{
     KEY_RANGE, KEY_WORLD_FROM_VOXEL, KEY_WRITER, ReadError, Supercompression, Texture, TextureFormat,
     WriteError, read, write,
@@ -18,6 +19,9 @@ fn texture(format: TextureFormat, sizes: [u32; 3]) -> Texture {
     let data = match format {
         TextureFormat::Block(BlockFormat::Bc4) => {
             encode_volume(BlockFormat::Bc4, &phantom::scalar(&hu), extent).unwrap()
+        }
+        TextureFormat::Block(BlockFormat::Bc5) => {
+            encode_two_planes(&hu, extent, [-1024.0, 3071.0]).unwrap().blocks
         }
         TextureFormat::Block(format) => encode_volume(format, &phantom::colour(&hu), extent).unwrap(),
         TextureFormat::R8 => phantom::scalar(&hu),

@@ -43,17 +43,21 @@ pub(crate) fn bc1_texel(block: &[u8], x: usize, y: usize, four_only: bool) -> [u
 
 /// The value of a texel of a BC4 block, or of the alpha half of a BC3 block.
 pub(crate) fn bc4_texel(block: &[u8], x: usize, y: usize) -> u8 {
+    byte(bc4_value(block, x, y))
+}
+
+/// The same in [0, 1], not rounded.
+pub(crate) fn bc4_value(block: &[u8], x: usize, y: usize) -> f64 {
     let (red0, red1) = (f64::from(block[0]) / 255.0, f64::from(block[1]) / 255.0);
     let code = bits(block, 16 + 3 * (4 * y + x), 3);
-    let value = match (code, red0 > red1) {
+    match (code, red0 > red1) {
         (0, _) => red0,
         (1, _) => red1,
         (n, true) => (f64::from(8 - n) * red0 + f64::from(n - 1) * red1) / 7.0,
         (6, false) => 0.0,
         (7, false) => 1.0,
         (n, false) => (f64::from(6 - n) * red0 + f64::from(n - 1) * red1) / 5.0,
-    };
-    byte(value)
+    }
 }
 
 /// A texel of a BC3 block: alpha first, then colour.

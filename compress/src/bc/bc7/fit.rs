@@ -1,15 +1,12 @@
 //! A line of colours through some texels of eight blocks at once: end points as a mode can store them, and where each
 //! texel is put between them.
 //!
-//! The first line is the principal axis; each round moves the ends to the least squares of the places found, which is
-//! `endpoints::LineFit` for many blocks. Errors are those of the values that a decoder gives back, to the last bit.
+//! The first line is the principal axis; each round moves the ends to the least squares of the places found. Errors are those of the values that a decoder gives back, to the last bit.
+#![expect(clippy::needless_range_loop, reason = "lanes, texels and matrices are indexed as in the formulas")]
 
-use super::lanes::Lanes;
 use super::modes::LowBits;
 use crate::bc::endpoints::TEXELS;
-
-/// One number for each texel of each block.
-pub(super) type Plane = [Lanes; TEXELS];
+use crate::bc::lanes::{Lanes, Plane, least_squares, sum};
 
 /// A positive number that no sum of weights is below, unless nothing is in it.
 const TINY: f32 = 1e-6;
@@ -51,11 +48,11 @@ impl<const C: usize> Colours<'_, C> {
     #[inline(always)]
     pub(super) fn line(&self, storage: Storage, rounds: usize) -> Line<C> {
         let importance = self.importance();
-        let mut best = self.placed(storage, self.stored(self.principal_ends(), storage, &importance));
+        let mut best = self.placed(storage, stored(self.principal_ends(), storage, &importance));
         let mut last = best;
         for _ in 0..rounds {
             let ends = self.least_squares(&last, storage);
-            last = self.placed(storage, self.stored(ends, storage, &importance));
+            last = self.placed(storage, stored(ends, storage, &importance));
             best = best.or_better(&last);
         }
         best
@@ -92,7 +89,7 @@ impl<const C: usize> Colours<'_, C> {
                 }
             }
         }
-        let axis = principal_axis(covariance);
+        let axis = principal_axis::<C, 3>(covariance);
         let length = axis.iter().fold(Lanes::all(TINY), |length, &part| length + part * part);
         let share = Lanes::ONE.over(length);
         let (mut low, mut high) = (Lanes::ZERO, Lanes::ZERO);
@@ -118,83 +115,13 @@ impl<const C: usize> Colours<'_, C> {
     /// The ends that fit the values best where the texels are placed now.
     #[inline(always)]
     fn least_squares(&self, line: &Line<C>, storage: Storage) -> [[Lanes; C]; 2] {
-        let per_step = 1.0 / storage.steps;
         let mut ends = line.values;
         for c in 0..C {
-            let (mut aa, mut ab, mut bb) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
-            let (mut a, mut b) = (Lanes::ZERO, Lanes::ZERO);
-            for i in 0..TEXELS {
-                let far = line.places[i] * per_step;
-                let near = Lanes::ONE - far;
-                let (near_weight, far_weight) = (self.weights[c][i] * near, self.weights[c][i] * far);
-                aa += near_weight * near;
-                ab += near_weight * far;
-                bb += far_weight * far;
-                a += near_weight * self.values[c][i];
-                b += far_weight * self.values[c][i];
-            }
-            let determinant = aa * bb - ab * ab;
-            // Below this the two ends are not told apart by the data: they stay.
-            let least = aa.max(bb) * aa.max(bb) * 1e-4 + Lanes::all(TINY * TINY);
-            let share = Lanes::ONE.over(determinant.max(least));
-            let fitted = [(bb * a - ab * b) * share, (aa * b - ab * a) * share];
-            for (end, fitted) in ends.iter_mut().zip(fitted) {
-                end[c] = least.less(determinant, fitted.clamped(255.0), end[c]);
-            }
+            let last = [ends[0][c], ends[1][c]];
+            [ends[0][c], ends[1][c]] =
+                least_squares(self.values[c], self.weights[c], &line.places, storage.steps, last);
         }
         ends
-    }
-
-    /// The nearest ends that can be stored: codes, lowest bits and decoded values.
-    #[inline(always)]
-    fn stored(&self, ends: [[Lanes; C]; 2], storage: Storage, importance: &[Lanes; C]) -> Line<C> {
-        let zero = [[Lanes::ZERO; C]; 2];
-        let mut line = Line {
-            codes: zero,
-            low: [Lanes::ZERO; 2],
-            values: zero,
-            places: [Lanes::ZERO; TEXELS],
-            error: Lanes::ZERO,
-        };
-        if storage.low_bits == LowBits::None {
-            for (end, at) in ends.iter().zip(0..) {
-                for c in 0..C {
-                    let code = (end[c].clamped(255.0) * (top(storage.bits) / 255.0)).rounded();
-                    line.codes[at][c] = code;
-                    line.values[at][c] = widened(code, storage.bits);
-                }
-            }
-            return line;
-        }
-        let mut off = [[Lanes::ZERO; 2]; 2];
-        let mut tried = [(zero, zero); 2];
-        for (low, (codes, values)) in tried.iter_mut().enumerate() {
-            for at in 0..2 {
-                for c in 0..C {
-                    let exact = ends[at][c].clamped(255.0) * (top(storage.bits + 1) / 255.0);
-                    let code = ((exact - Lanes::all(low as f32)) * 0.5).rounded().clamped(top(storage.bits));
-                    codes[at][c] = code;
-                    values[at][c] = widened(code * 2.0 + Lanes::all(low as f32), storage.bits + 1);
-                    let error = values[at][c] - ends[at][c];
-                    off[low][at] += error * error * importance[c];
-                }
-            }
-        }
-        if storage.low_bits == LowBits::EachSubset {
-            for off in &mut off {
-                *off = [off[0] + off[1]; 2];
-            }
-        }
-        let [(codes_0, values_0), (codes_1, values_1)] = tried;
-        for at in 0..2 {
-            let pick = |one: Lanes, zero: Lanes| off[1][at].less(off[0][at], one, zero);
-            line.low[at] = pick(Lanes::ONE, Lanes::ZERO);
-            for c in 0..C {
-                line.codes[at][c] = pick(codes_1[at][c], codes_0[at][c]);
-                line.values[at][c] = pick(values_1[at][c], values_0[at][c]);
-            }
-        }
-        line
     }
 
     /// The line with each texel at the better of the two places beside it.
@@ -236,6 +163,15 @@ impl<const C: usize> Colours<'_, C> {
 }
 
 impl<const C: usize> Line<C> {
+    /// No line yet.
+    pub(super) const NONE: Self = Self {
+        codes: [[Lanes::ZERO; C]; 2],
+        low: [Lanes::ZERO; 2],
+        values: [[Lanes::ZERO; C]; 2],
+        places: [Lanes::ZERO; TEXELS],
+        error: Lanes::ZERO,
+    };
+
     /// In each lane the line of the smaller error.
     #[inline(always)]
     fn or_better(&self, other: &Self) -> Self {
@@ -256,6 +192,51 @@ impl<const C: usize> Line<C> {
     }
 }
 
+/// The nearest ends that can be stored: codes, lowest bits and decoded values.
+#[inline(always)]
+fn stored<const C: usize>(ends: [[Lanes; C]; 2], storage: Storage, importance: &[Lanes; C]) -> Line<C> {
+    let mut line = Line::NONE;
+    if storage.low_bits == LowBits::None {
+        for (end, at) in ends.iter().zip(0..) {
+            for c in 0..C {
+                let code = (end[c].clamped(255.0) * (top(storage.bits) / 255.0)).rounded();
+                line.codes[at][c] = code;
+                line.values[at][c] = widened(code, storage.bits);
+            }
+        }
+        return line;
+    }
+    let mut off = [[Lanes::ZERO; 2]; 2];
+    let mut tried = [([[Lanes::ZERO; C]; 2], [[Lanes::ZERO; C]; 2]); 2];
+    for (low, (codes, values)) in tried.iter_mut().enumerate() {
+        for at in 0..2 {
+            for c in 0..C {
+                let exact = ends[at][c].clamped(255.0) * (top(storage.bits + 1) / 255.0);
+                let code = ((exact - Lanes::all(low as f32)) * 0.5).rounded().clamped(top(storage.bits));
+                codes[at][c] = code;
+                values[at][c] = widened(code * 2.0 + Lanes::all(low as f32), storage.bits + 1);
+                let error = values[at][c] - ends[at][c];
+                off[low][at] += error * error * importance[c];
+            }
+        }
+    }
+    if storage.low_bits == LowBits::EachSubset {
+        for off in &mut off {
+            *off = [off[0] + off[1]; 2];
+        }
+    }
+    let [(codes_0, values_0), (codes_1, values_1)] = tried;
+    for at in 0..2 {
+        let pick = |one: Lanes, zero: Lanes| off[1][at].less(off[0][at], one, zero);
+        line.low[at] = pick(Lanes::ONE, Lanes::ZERO);
+        for c in 0..C {
+            line.codes[at][c] = pick(codes_1[at][c], codes_0[at][c]);
+            line.values[at][c] = pick(values_1[at][c], values_0[at][c]);
+        }
+    }
+    line
+}
+
 /// The largest number of so many bits.
 #[inline(always)]
 fn top(bits: u32) -> f32 {
@@ -271,18 +252,14 @@ fn widened(code: Lanes, bits: u32) -> Lanes {
     code * (1 << (8 - bits)) as f32 + repeated
 }
 
-/// The sum of a plane.
+/// The direction of the largest eigenvalue of a symmetric matrix, of any length; only the upper half is read. A high
+/// power of the matrix, the eighth by three squarings, is nearly that eigenvector times itself, and its column of the
+/// largest diagonal is not orthogonal to it.
 #[inline(always)]
-pub(super) fn sum(plane: &Plane) -> Lanes {
-    plane.iter().fold(Lanes::ZERO, |sum, &lanes| sum + lanes)
-}
-
-/// The direction of the largest eigenvalue of a symmetric matrix, of any length; only the upper half is read. The
-/// eighth power of the matrix is nearly that eigenvector times itself, and its column of the largest diagonal is not
-/// orthogonal to it.
-#[inline(always)]
-pub(super) fn principal_axis<const C: usize>(mut matrix: [[Lanes; C]; C]) -> [Lanes; C] {
-    for _ in 0..3 {
+pub(super) fn principal_axis<const C: usize, const SQUARINGS: usize>(
+    mut matrix: [[Lanes; C]; C],
+) -> [Lanes; C] {
+    for _ in 0..SQUARINGS {
         let mut trace = Lanes::all(TINY);
         for c in 0..C {
             trace += matrix[c][c];

@@ -23,7 +23,6 @@
 mod decode;
 mod encode;
 mod fit;
-mod lanes;
 mod modes;
 mod pack;
 mod partitions;

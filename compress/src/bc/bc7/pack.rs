@@ -76,7 +76,9 @@ impl Content {
             LowBits::EachEnd => &self.low[..2 * mode.subsets],
             LowBits::EachSubset => &[self.low[0], self.low[2]],
         };
-        shared.iter().for_each(|&low| bits.put(low.into(), 1));
+        for &low in shared {
+            bits.put(low.into(), 1);
+        }
         let (first, second) =
             if self.colour_takes_second { (&self.alpha, &self.colour) } else { (&self.colour, &self.alpha) };
         for (indices, count) in [(first, mode.index_bits), (second, mode.second_index_bits)] {

@@ -3,10 +3,10 @@
 //! Each of the 64 patterns is judged by what two lines without rounding would leave: the trace of each subset's
 //! covariance less its largest eigenvalue.
 
-use super::fit::{Plane, principal_axis, sum};
-use super::lanes::{LANES, Lanes};
+use super::fit::principal_axis;
 use super::partitions::TWO;
 use crate::bc::endpoints::TEXELS;
+use crate::bc::lanes::{LANES, Lanes, Plane, sum};
 
 /// Sums of a subset: of the weights, of the four channels, and of the ten products of two channels.
 const SUMS: usize = 15;
@@ -82,7 +82,7 @@ fn off_line(sums: &[Lanes; SUMS]) -> Lanes {
             trace += covariance[a][b];
         }
     }
-    let axis = principal_axis(covariance);
+    let axis = principal_axis::<4, 2>(covariance);
     let (mut along, mut length) = (Lanes::ZERO, Lanes::all(1e-6));
     for a in 0..4 {
         let mut row = Lanes::ZERO;
