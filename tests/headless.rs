@@ -294,3 +294,129 @@ fn a_compressed_volume_is_a_ktx2_file() {
     };
     assert!(threads("1") == threads("4"), "the bytes do not depend on the number of threads");
 }
+
+/// Twelve numbered volumes of one frame: a bright box that moves along x.
+fn numbered_volumes(folder: &Path) {
+    for step in 0..12_u8 {
+        let mut file =
+            b"NRRD0004\ntype: uchar\ndimension: 3\nspace: left-posterior-superior\nsizes: 24 20 16\n\
+            space directions: (2,0,0) (0,2,0) (0,0,3)\nspace origin: (-24,-20,-24)\nencoding: raw\n\n"
+                .to_vec();
+        let inside = |x: usize, y: usize, z: usize| {
+            (4..14).contains(&x.saturating_sub(usize::from(step) / 2))
+                && (5..15).contains(&y)
+                && (4..12).contains(&z)
+        };
+        for i in 0..24 * 20 * 16 {
+            let (x, y, z) = (i % 24, i / 24 % 20, i / 480);
+            file.push(if inside(x, y, z) { 200 + (i % 7) as u8 } else { 20 + step });
+        }
+        std::fs::write(folder.join(format!("beat_{step:02}.nrrd")), file).expect("written");
+    }
+}
+
+#[test]
+fn numbered_volumes_become_a_series_file_that_states_its_error_and_is_drawn() {
+    let folder = tempfile::tempdir().expect("folder");
+    let volumes = folder.path().join("volumes");
+    std::fs::create_dir(&volumes).expect("folder");
+    numbered_volumes(&volumes);
+    let series = folder.path().join("beat.series");
+    let args = [
+        "compress",
+        text(&volumes),
+        "--format",
+        "pvtc",
+        "--layout",
+        "4,3",
+        "--out",
+        text(&series),
+        "--stats",
+    ];
+    let made = osteotome(&args);
+    assert_eq!(made.code(), 0, "{}", made.stderr);
+    let stats: Value = serde_json::from_str(&made.stdout).expect("one JSON object");
+    assert_eq!((&stats["steps"], &stats["codec"]), (&json!(12), &json!("pvtc <4,3>")), "{stats}");
+    assert_eq!(stats["payload_bytes"], json!(4 * 6 * 5 * 4 * 20), "5/48 of the samples: known beforehand");
+    let largest = stats["largest_value_error"].as_f64().expect("an error");
+    assert!(largest > 0.0 && stats["psnr_db"].as_f64().is_some_and(|p| p > 30.0), "{stats}");
+
+    let info = osteotome(&["info", text(&series), "--json"]);
+    assert_eq!(info.code(), 0, "{}", info.stderr);
+    let info: Value = serde_json::from_str(&info.stdout).expect("JSON");
+    let item = &info["items"][0];
+    assert_eq!((&item["kind"], &item["steps"]), (&json!("series"), &json!(12)), "{item}");
+    assert_eq!(item["extent"], json!([24, 20, 16]), "{item}");
+    assert_eq!(item["largest_error"].as_f64(), Some(largest), "the file states the error that was measured");
+
+    if !gpu_wanted() {
+        return;
+    }
+    let case = folder.path().join("case.json");
+    let picture = |step: usize, backend: &str| {
+        let document = json!({
+            "osteotome": 1,
+            "volumes": [{"id": "beat", "source": "beat.series", "step": step,
+                "transfer": {"points": [[0, 0, 0, 0, 0], [100, 0.9, 0.5, 0.3, 0.0], [210, 1, 0.9, 0.8, 0.6]]}}],
+            "camera": {"eye": [40, -160, 60], "target": [0, 0, 0], "up": [0, 0, 1], "fov_deg": 25},
+        });
+        std::fs::write(&case, document.to_string()).expect("written");
+        let out = folder.path().join(format!("{backend}_{step}.png"));
+        let args = ["render", text(&case), "--out", text(&out), "--size", "96x80", "--backend", backend];
+        let drawn = osteotome(&[&args[..], &["--quality", "finest", "--stats"]].concat());
+        assert_eq!(drawn.code(), 0, "{}", drawn.stderr);
+        (open_rgb(&out), serde_json::from_str::<Value>(&drawn.stdout).expect("JSON"))
+    };
+    let (first, stats) = picture(0, "gpu");
+    assert_eq!(
+        stats["textures"][0]["format"],
+        json!("pvtc<4,3>"),
+        "drawn from its compressed bytes: {stats}"
+    );
+    let (last, _) = picture(11, "gpu");
+    assert!(difference(&first, &last).max > 40.0, "the box has moved");
+    let (truth, _) = picture(11, "reference");
+    assert!(difference(&last, &truth).max <= 4.0, "as the reference draws the decoded samples");
+}
+
+#[test]
+fn a_goal_chooses_the_codecs_of_a_series() {
+    let folder = tempfile::tempdir().expect("folder");
+    numbered_volumes(folder.path());
+    let series = folder.path().join("chosen.out");
+    let chosen = |goal: &str| -> Value {
+        let args = ["compress", text(folder.path()), "--format", "series", "--goal", goal];
+        let made = osteotome(&[&args[..], &["--out", text(&series), "--stats"]].concat());
+        assert_eq!(made.code(), 0, "{}", made.stderr);
+        serde_json::from_str(&made.stdout).expect("one JSON object")
+    };
+    let fine = chosen("psnr=45");
+    assert!(fine["psnr_db"].as_f64().is_none_or(|p| p >= 44.5), "{fine}");
+    let small = chosen("mib=0.01");
+    let bytes = |stats: &Value| stats["file_bytes"].as_f64().expect("bytes");
+    // The header, the index and the times are beside what is compressed.
+    assert!(bytes(&small) <= 0.01 * 1048576.0 + 1200.0, "{small}");
+    assert!(bytes(&small) < bytes(&fine), "a smaller file: {small} {fine}");
+    let wrong = osteotome(&["compress", "x", "--format", "series", "--goal", "soon", "--out", text(&series)]);
+    assert_eq!(wrong.code(), 2, "no goal: {}", wrong.stderr);
+}
+
+#[test]
+fn a_damaged_series_file_is_named_with_its_fault() {
+    let folder = tempfile::tempdir().expect("folder");
+    numbered_volumes(folder.path());
+    let series = folder.path().join("beat.series");
+    let made = osteotome(&["compress", text(folder.path()), "--format", "pvtc-te", "--out", text(&series)]);
+    assert_eq!(made.code(), 0, "{}", made.stderr);
+    let whole = std::fs::read(&series).expect("read");
+    let cut = folder.path().join("cut.series");
+    std::fs::write(&cut, &whole[..whole.len() / 2]).expect("written");
+    assert_error(&osteotome(&["info", text(&cut)]), 3, "cut.series");
+    let mut flipped = whole;
+    flipped[600] ^= 0x10;
+    let broken = folder.path().join("flipped.series");
+    std::fs::write(&broken, flipped).expect("written");
+    let picture = folder.path().join("p.png");
+    assert_error(&osteotome(&["render", text(&broken), "--out", text(&picture)]), 3, "flipped.series");
+    assert!(!picture.exists(), "a damaged step is no picture");
+}

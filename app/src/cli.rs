@@ -15,6 +15,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::headless::{self, Failure};
 use crate::host::HostError;
 use crate::load::LoadError;
+use crate::save::choice::Goal;
 
 /// Surgical planning: volumes, cuts, fragments and implants, in a window or without one.
 #[derive(Debug, Parser)]
@@ -121,6 +122,12 @@ pub struct CompressArgs {
     /// For a series: what packs the bytes once more, without loss.
     #[arg(long, value_enum, default_value_t = SecondStage::Zstd)]
     pub second: SecondStage,
+    /// For series: psnr=DB, mib=MEBIBYTES or fps=STEPS_PER_SECOND.
+    #[arg(long, value_name = "GOAL", value_parser = goal, default_value = "psnr=40")]
+    pub goal: Goal,
+    /// For series: reading from the disk that it is to play from, MB a second.
+    #[arg(long, value_name = "MB", default_value_t = 500.0)]
+    pub disk: f64,
     /// Threads used; all cores if not given. The bytes do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -191,6 +198,8 @@ pub enum Format {
     R16,
     /// Pre-classified colour and opacity, 8 bits a voxel, accurate.
     Bc7,
+    /// Volume over time: whatever keeps to --goal, tried on some of its steps.
+    Series,
     /// Volume over time: PVTC of a layout <S,T>.
     Pvtc,
     /// Volume over time: PVTC-TE, three steps in the channels of BC1.
@@ -253,6 +262,22 @@ fn layout(text: &str) -> Result<Layout, String> {
     let (s, t) = text.split_once(',').ok_or_else(wrong)?;
     let number = |text: &str| text.trim().parse::<u8>().map_err(|_not_a_number| wrong());
     Layout::new(number(s)?, number(t)?).map_err(|e| e.to_string())
+}
+
+/// `psnr=40`.
+fn goal(text: &str) -> Result<Goal, String> {
+    let wrong = || format!("\"{text}\" is no goal: write psnr=40, mib=100 or fps=25");
+    let (kind, number) = text.split_once('=').ok_or_else(wrong)?;
+    let number: f64 = number.parse().map_err(|_not_a_number| wrong())?;
+    if !(number.is_finite() && number > 0.0) {
+        return Err(wrong());
+    }
+    match kind {
+        "psnr" => Ok(Goal::Psnr(number)),
+        "mib" => Ok(Goal::Bytes(number * f64::from(1 << 20))),
+        "fps" => Ok(Goal::Fps(number)),
+        _ => Err(wrong()),
+    }
 }
 
 /// `640x480`.
@@ -329,6 +354,16 @@ mod tests {
         assert_eq!(size("640x480"), Ok([640, 480]), "as written");
         for wrong in ["640", "0x10", "10x0", "-1x5", "99999x2", "ax3", "1x2x3", ""] {
             assert!(size(wrong).is_err(), "{wrong} was accepted");
+        }
+    }
+
+    #[test]
+    fn a_goal_is_a_kind_and_a_positive_number() {
+        assert_eq!(goal("psnr=40"), Ok(Goal::Psnr(40.0)), "quality");
+        assert_eq!(goal("mib=0.5"), Ok(Goal::Bytes(524_288.0)), "size");
+        assert_eq!(goal("fps=25"), Ok(Goal::Fps(25.0)), "speed");
+        for wrong in ["psnr", "psnr=", "psnr=-1", "fps=inf", "x=1", ""] {
+            assert!(goal(wrong).is_err(), "{wrong} was accepted");
         }
     }
 

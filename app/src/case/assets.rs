@@ -107,7 +107,9 @@ pub enum AssetError {
         path: PathBuf,
     },
     /// No built-in data of that name.
-    #[error("there are no built-in data \"{name}\"; use builtin:hip/ct, builtin:hip/mri, builtin:hip/stem or builtin:beat")]
+    #[error(
+        "there are no built-in data \"{name}\"; use builtin:hip/ct, builtin:hip/mri, builtin:hip/stem or builtin:beat"
+    )]
     NoBuiltin {
         /// As asked for.
         name: String,

@@ -357,11 +357,12 @@ fn pose(value: Value, at: String) -> Read<Affine> {
     })
 }
 
-const TEXTURES: [TextureFormat; 7] = [
+const TEXTURES: [TextureFormat; 8] = [
     TextureFormat::Auto,
     TextureFormat::R16,
     TextureFormat::R32f,
     TextureFormat::Bc4,
+    TextureFormat::Bc5,
     TextureFormat::Rgba8,
     TextureFormat::Bc3,
     TextureFormat::Bc7,
@@ -374,7 +375,7 @@ fn texture(value: Value, at: String) -> Read<TextureFormat> {
         None => fault(
             at,
             format!("\"{text}\" is not a texture format"),
-            "write auto, r16, r32f, bc4, rgba8, bc3 or bc7",
+            "write auto, r16, r32f, bc4, bc5, rgba8, bc3 or bc7",
         ),
     }
 }

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use ::compress::bc::Level;
 use ::render::GridSource;
 use ::render::gpu::Gpu;
+use ::render::image::FloatImage;
 use ::render::reference;
 use ::render::renderer::{Quality, Renderer};
 use ::render::scene::{Scene, Shading, TextureFormat};
@@ -43,6 +44,16 @@ const FORMATS: [(Format, Format); 4] = [
     (Format::Bc1, Format::Rgba8),
     (Format::Bc7, Format::Rgba8),
 ];
+/// The pictures of `compress`, as large as Doi's; pixels.
+const PICTURE: [u32; 2] = [425, 481];
+/// Textures that are drawn, each with the uncompressed one that it stands beside.
+const PICTURES: [(TextureFormat, TextureFormat); 5] = [
+    (TextureFormat::Bc3, TextureFormat::Rgba8),
+    (TextureFormat::Bc7, TextureFormat::Rgba8),
+    (TextureFormat::Bc4, TextureFormat::R32f),
+    (TextureFormat::Bc5, TextureFormat::R32f),
+    (TextureFormat::Auto, TextureFormat::R32f),
+];
 /// Turns of `compress`: a texture takes milliseconds.
 const TURNS: usize = 15;
 
@@ -66,6 +77,7 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
         }
         BenchName::Compress => {
             textures(&input, path, &mut bench)?;
+            pictures(&input, &mut bench)?;
             ("compress.svg", compress_chart)
         }
         BenchName::Series => {
@@ -197,7 +209,8 @@ fn textures(input: &Input, path: &Path, bench: &mut Bench) -> Result<(), Failure
     for threads in thread_counts() {
         let pool = compress::pool(threads)?;
         for (format, plain) in FORMATS {
-            let levels: &[Level] = if format == Format::Bc4 { &[Level::Best] } else { &[Level::Fast, Level::Best] };
+            let levels: &[Level] =
+                if format == Format::Bc4 { &[Level::Best] } else { &[Level::Fast, Level::Best] };
             for &level in levels {
                 let make = |format, out: &mut Vec<u8>| -> Result<f64, Failure> {
                     let begin = Instant::now();
@@ -231,6 +244,56 @@ fn textures(input: &Input, path: &Path, bench: &mut Bench) -> Result<(), Failure
     Ok(())
 }
 
+/// Doi's table 2: how far pictures of compressed textures are from those of uncompressed ones, channel by channel,
+/// the background left out.
+fn pictures(input: &Input, bench: &mut Bench) -> Result<(), Failure> {
+    let mut scene = scene::scene(&input.case, &input.assets);
+    for volume in &mut scene.volumes {
+        volume.shading = Shading::None;
+    }
+    let mut renderer = Renderer::new(Arc::new(Gpu::headless()?))?;
+    let mut draw = |texture| -> Result<(FloatImage, String), Failure> {
+        for volume in &mut scene.volumes {
+            volume.texture = texture;
+        }
+        let stats = renderer.render(&scene, PICTURE, Quality::Good)?;
+        let drawn: Vec<String> = stats.textures.iter().map(|t| t.stored.to_string()).collect();
+        Ok((renderer.read()?, drawn.join("+")))
+    };
+    for (texture, plain) in PICTURES {
+        let (exact, against) = draw(plain)?;
+        let (picture, drawn) = draw(texture)?;
+        let squares = channels(&picture, &exact);
+        let (psnr_db, rms) = (squares.map(psnr), squares.map(f64::sqrt));
+        bench.report(json!({
+            "bench": "compress", "picture": PICTURE, "texture": texture.name(), "drawn_as": drawn, "against": against,
+            "psnr_db_rgb": psnr_db, "rms_255_rgb": rms,
+        }))?;
+    }
+    Ok(())
+}
+
+/// Peak signal-to-noise ratio of a mean square in 1/255, dB; none where nothing differs.
+pub(super) fn psnr(mean_square: f64) -> Option<f64> {
+    (mean_square > 0.0).then(|| 10.0 * (255.0 * 255.0 / mean_square).log10())
+}
+
+/// Mean squares of the differences of red, green and blue, in 1/255, over the pixels that show anything.
+fn channels(picture: &FloatImage, exact: &FloatImage) -> [f64; 3] {
+    let (mut squares, mut count) = ([0.0; 3], 0.0);
+    for (a, b) in picture.pixels.iter().zip(&exact.pixels) {
+        if a[3] > 0.0 || b[3] > 0.0 {
+            count += 1.0;
+            for c in 0..3 {
+                // Pictures are shown in whole numbers.
+                let shown = |p: &[f32; 4]| f64::from(p[c].clamp(0.0, 1.0) * 255.0).round();
+                squares[c] += (shown(a) - shown(b)).powi(2);
+            }
+        }
+    }
+    squares.map(|sum: f64| sum / f64::max(count, 1.0))
+}
+
 /// One thread and all of them.
 fn thread_counts() -> Vec<usize> {
     let all = rayon::current_num_threads();
@@ -243,7 +306,9 @@ fn compress_chart(rows: &[Row]) -> Chart {
         title: "Textures: time against error".to_owned(),
         x: "from samples to blocks, ms".to_owned(),
         y: "PSNR against the samples, dB".to_owned(),
-        series: series(rows, "format", &|row| (number(row, "texture_ms"), number(row, "psnr_db"), label(row))),
+        series: series(rows, "format", &|row| {
+            (number(row, "texture_ms"), number(row, "psnr_db"), label(row))
+        }),
     }
 }
 
@@ -296,6 +361,16 @@ mod tests {
     fn the_median_ignores_one_busy_moment() {
         assert_eq!(median(vec![5.0, 900.0, 4.0]), 5.0, "the middle");
         assert!(median(Vec::new()).is_nan(), "of nothing");
+    }
+
+    #[test]
+    fn the_background_is_left_out_of_a_channels_error() {
+        let image = |pixels: Vec<[f32; 4]>| FloatImage { width: pixels.len() as u32, height: 1, pixels };
+        let exact = image(vec![[0.2, 0.4, 0.6, 1.0], [0.0; 4], [0.0; 4], [0.0; 4]]);
+        let picture = image(vec![[0.2, 0.4, 0.6 + 10.0 / 255.0, 1.0], [0.0; 4], [0.0; 4], [0.0; 4]]);
+        assert_eq!(channels(&picture, &exact), [0.0, 0.0, 100.0], "one pixel of four");
+        assert_eq!(psnr(0.0), None, "nothing differs, and JSON has no infinity");
+        assert!((psnr(1.0).expect("dB") - 48.1308).abs() < 1e-4, "of an error of one");
     }
 
     #[test]

@@ -42,7 +42,9 @@ impl Format {
             Self::Rgba8 => Kind::Texels(TexelFormat::Rgba8),
             Self::R8 => Kind::Texels(TexelFormat::R8),
             Self::R16 => Kind::Texels(TexelFormat::R16),
-            Self::Pvtc | Self::PvtcTe | Self::PvtcSe | Self::Raw8 | Self::Raw16 => return None,
+            Self::Series | Self::Pvtc | Self::PvtcTe | Self::PvtcSe | Self::Raw8 | Self::Raw16 => {
+                return None;
+            }
         })
     }
 
@@ -93,7 +95,8 @@ impl<'a> Textures<'a> {
 
     fn source(&self, format: Format) -> Result<(Source<'_>, Kind), Failure> {
         let kind = format.kind();
-        let kind = kind.ok_or_else(|| Failure::Usage(format!("{} is of a volume over time", format.name())))?;
+        let kind =
+            kind.ok_or_else(|| Failure::Usage(format!("{} is of a volume over time", format.name())))?;
         let mapping = match format {
             Format::Bc1 => Mapping::Colours(&self.opaque),
             _ if format.is_colour() => Mapping::Colours(&self.colours),
@@ -156,8 +159,8 @@ impl<'a> Textures<'a> {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &CompressArgs) -> Result<(), Failure> {
-    if let Some(codec) = args.format.of_series(args.layout) {
-        return super::series::compress(args, codec);
+    if args.format.kind().is_none() {
+        return super::series::compress(args);
     }
     check_folder(&args.out)?;
     let input = input::open(&args.input)?;
@@ -323,7 +326,10 @@ mod tests {
         for format in FORMATS {
             let with = |threads| {
                 let mut out = Vec::new();
-                pool(threads).expect("pool").install(|| textures.make(format, Level::Best, &mut out)).expect("made");
+                pool(threads)
+                    .expect("pool")
+                    .install(|| textures.make(format, Level::Best, &mut out))
+                    .expect("made");
                 out
             };
             let one = with(1);
@@ -333,7 +339,9 @@ mod tests {
 
     #[test]
     fn a_format_of_series_is_no_texture() {
-        for format in [Format::Pvtc, Format::PvtcTe, Format::PvtcSe, Format::Raw8, Format::Raw16] {
+        for format in
+            [Format::Series, Format::Pvtc, Format::PvtcTe, Format::PvtcSe, Format::Raw8, Format::Raw16]
+        {
             assert_eq!(format.kind(), None, "{}", format.name());
         }
         assert!(FORMATS.iter().all(|f| f.kind().is_some()), "and the others are");

@@ -2,14 +2,17 @@
 
 use std::path::Path;
 
+use ::compress::container::Reader;
 use ::render::volume::cells::{CellKind, Field, Place};
 use ::render::volume::{Affine, CellGrid, Grid, TriangleMesh};
 use serde_json::{Value, json};
 
 use super::{Failure, Terminal, input, say};
+use crate::case::assets::AssetError;
 use crate::case::{Case, file};
 use crate::cli::InfoArgs;
 use crate::load::{self, Content, Item, Limits, Note, Severity};
+use crate::steps::{self, SeriesFileError};
 
 /// Says what is in each path.
 ///
@@ -39,8 +42,54 @@ fn items(path: &Path) -> Result<Vec<Value>, Failure> {
         let case = file::load(path).map_err(Failure::Case)?;
         return Ok(vec![case_json(&case, path)]);
     }
+    if steps::is_series(path) {
+        return Ok(vec![series_json(path)?]);
+    }
     let items = load::open(path, &Limits::default(), &Terminal::default())?;
     Ok(items.iter().map(|item| item_json(item, path)).collect())
+}
+
+/// A series file: what its header and its end say. No step is read.
+fn series_json(path: &Path) -> Result<Value, Failure> {
+    let limits = ::compress::Limits { decoded_bytes: Limits::default().decoded_bytes };
+    let reader = Reader::open(path, &limits)
+        .map_err(|source| AssetError::from(SeriesFileError::Read { source, path: path.to_owned() }))?;
+    let (header, figures) = (reader.header(), reader.figures());
+    let samples = header.extent.voxels() as f64 * f64::from(reader.steps());
+    let bytes = std::fs::metadata(path).map_or(0, |m| m.len());
+    let place = Affine::from_row_major(&header.world_from_voxel);
+    let place =
+        place.map_err(|_singular| AssetError::from(SeriesFileError::Place { path: path.to_owned() }))?;
+    let notes: Vec<Value> = if figures.largest_error == Some(0.0) {
+        Vec::new()
+    } else {
+        vec![
+            json!({"severity": "caution", "code": "series.lossy", "text": "The steps are lossy: values differ from the original's."}),
+        ]
+    };
+    Ok(json!({
+        "kind": "series",
+        "path": path.display().to_string(),
+        "name": header.name,
+        "format": "Osteotome series",
+        "modality": Some(&header.kind).filter(|kind| !kind.is_empty()),
+        "unit": Some(&header.unit).filter(|unit| !unit.is_empty()),
+        "extent": header.extent.sizes(),
+        "spacing_mm": place.column_lengths(),
+        "orientation": orientation(&place),
+        "world_from_voxel": header.world_from_voxel,
+        "rescale": {"slope": header.value_scale, "intercept": header.value_offset},
+        "steps": reader.steps(),
+        "times_secs": reader.times_secs(),
+        "codec": header.codec.to_string(),
+        "second": header.byte_codec.name(),
+        "chunks": reader.chunks(),
+        "bytes": bytes,
+        "ratio": samples / bytes as f64,
+        "largest_error": figures.largest_error,
+        "psnr_db": figures.psnr_db.filter(|psnr| psnr.is_finite()),
+        "notes": notes,
+    }))
 }
 
 fn case_json(case: &Case, path: &Path) -> Value {

@@ -22,15 +22,18 @@ use serde_json::json;
 
 use super::bench::Bench;
 use super::input::Input;
-use super::series::{Bytes, steps};
+use super::series::{Bytes, Sender, steps};
 use super::{Failure, Terminal};
 use crate::load::Progress as _;
+use crate::save::choice::{self, Goal, Machine};
 use crate::save::series::encode_group;
 use crate::scene;
 use crate::steps::packed_step;
 
 /// Turns; the shortest time of each counts.
 const TURNS: usize = 4;
+/// What the disk's speed is measured with.
+const DISK_BYTES: usize = 64 << 20;
 /// The picture that every step is drawn in where drawing is measured too; pixels.
 const SIZE: [u32; 2] = [128, 128];
 
@@ -58,16 +61,18 @@ impl Candidate {
 
 pub(super) fn bench(input: &Input, path: &Path, bench: &mut Bench) -> Result<(), Failure> {
     let (_, steps) = steps(input, path)?;
-    let bytes = Bytes::new(steps, bench.enlarge())?;
-    let folder = tempfile::tempdir().map_err(|e| Failure::Other(format!("no folder for the series files: {e}")))?;
+    let bytes = Bytes::new(steps, bench.enlarge(), 0..steps.times_secs().len())?;
+    let folder =
+        tempfile::tempdir().map_err(|e| Failure::Other(format!("no folder for the series files: {e}")))?;
     let terminal = Terminal::default();
     let settings = settings();
+    let gpu = Arc::new(Gpu::headless()?);
+    let automatic = automatic(&bytes, folder.path(), &gpu)?;
     let mut all = Vec::new();
     for (i, &(codec, second, decoder)) in settings.iter().enumerate() {
         terminal.step("writing series files", i, settings.len());
         all.push(write(&bytes, folder.path(), codec, second, decoder, i)?);
     }
-    let gpu = Arc::new(Gpu::headless()?);
     let mut cold = true;
     for turn in 0..TURNS {
         terminal.step("playing", turn, TURNS);
@@ -77,6 +82,7 @@ pub(super) fn bench(input: &Input, path: &Path, bench: &mut Bench) -> Result<(),
             candidate.secs = candidate.secs.min(secs);
         }
     }
+    let fastest = all.iter().map(|c| c.secs).fold(f64::INFINITY, f64::min);
     let count = bytes.steps.len() as f64;
     let raw_secs = all.first().map_or(f64::NAN, |c| c.secs);
     for candidate in &all {
@@ -89,7 +95,8 @@ pub(super) fn bench(input: &Input, path: &Path, bench: &mut Bench) -> Result<(),
             "cache": if cold { "dropped before each run" } else { "warm: this system keeps it" },
             "file_bytes": file_bytes, "ratio": bytes.voxels() / *file_bytes as f64,
             "volumes_per_s": count / secs, "mvoxel_per_s": bytes.voxels() / 1e6 / secs,
-            "to_uncompressed": raw_secs / secs,
+            "to_uncompressed": raw_secs / secs, "to_fastest": fastest / secs,
+            "chosen_automatically": (*codec, *second) == automatic && *decoder != StepDecoder::Device,
             "drawn_volumes_per_s": drawn, "drawn_size": SIZE,
             "psnr_db": figures.psnr_db.filter(|p| p.is_finite()), "largest_value": figures.largest_error,
         }))?;
@@ -117,6 +124,33 @@ fn settings() -> Vec<(StepCodec, ByteCodec, StepDecoder)> {
     settings
 }
 
+/// What is chosen for the fastest playing: the disk is measured, the rest tried on some steps.
+fn automatic(bytes: &Bytes, folder: &Path, gpu: &Arc<Gpu>) -> Result<(StepCodec, ByteCodec), Failure> {
+    let path = folder.join("disk");
+    let output = |source| Failure::Output { path: path.clone(), source };
+    std::fs::write(&path, vec![0xA5_u8; DISK_BYTES]).map_err(output)?;
+    let mut disk_bytes_per_sec = 0.0_f64;
+    for _ in 0..TURNS {
+        forget(&path);
+        let begin = Instant::now();
+        let read = std::fs::read(&path).map_err(output)?;
+        disk_bytes_per_sec = disk_bytes_per_sec.max(read.len() as f64 / begin.elapsed().as_secs_f64());
+    }
+    let machine = Machine { disk_bytes_per_sec, threads: Options::default().threads.get() };
+    let mut sender = Sender::new(gpu, bytes)?;
+    let sample = bytes.steps.get(..choice::SAMPLE_STEPS).unwrap_or(&bytes.steps);
+    let mut codecs: Vec<StepCodec> = settings().into_iter().map(|(codec, ..)| codec).collect();
+    codecs.dedup();
+    let trials = choice::trials(sample, bytes.extent, codecs.into_iter(), machine, &mut |codec, payload| {
+        sender.secs(codec, payload)
+    });
+    let trials = trials.map_err(|e| other(&e))?;
+    let found = choice::choose(&trials, Goal::Fps(f64::INFINITY), bytes.steps.len());
+    let found =
+        found.ok_or_else(|| Failure::Other("no codec could be tried; please report this".to_owned()))?;
+    Ok((found.trial.codec, found.trial.byte_codec))
+}
+
 fn other(error: &dyn std::error::Error) -> Failure {
     let cause = error.source().map_or_else(String::new, |cause| format!(" ({cause})"));
     Failure::Other(format!("{error}{cause}"))
@@ -131,9 +165,7 @@ fn write(
     number: usize,
 ) -> Result<Candidate, Failure> {
     let path = folder.join(format!("{number}.series"));
-    let mut header = Header::new(bytes.extent, codec, second);
-    (header.value_scale, header.value_offset) = (bytes.quantiser.scale, bytes.quantiser.offset);
-    header.world_from_voxel = bytes.place.to_row_major();
+    let header = Header { byte_codec: second, ..bytes.header(codec) };
     let mut file = FileWriter::create(&path, &header, PackOptions::default()).map_err(|e| other(&e))?;
     let group = usize::from(codec.steps_per_chunk());
     let (mut largest, mut squares, mut decoded) = (0_u8, 0_u64, Vec::new());
@@ -172,8 +204,7 @@ fn forget(_path: &Path) -> bool {
 fn stream(path: &Path) -> Result<(Stream, Figures), Failure> {
     let reader = Reader::open(path, &Limits::default()).map_err(|e| other(&e))?;
     let figures = reader.figures();
-    let mut stream =
-        Stream::spawn(reader, Options::default()).map_err(|e| Failure::Other(e.to_string()))?;
+    let mut stream = Stream::spawn(reader, Options::default()).map_err(|e| Failure::Other(e.to_string()))?;
     stream.play_from(0, Direction::Forward, Repeat::Once).map_err(|e| other(&e))?;
     Ok((stream, figures))
 }

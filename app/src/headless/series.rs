@@ -1,26 +1,28 @@
 //! `compress` of a volume over time, and `bench series`: codecs of time series, run time beside error.
 
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use ::compress::container::StepCodec;
+use ::compress::Extent3;
+use ::compress::container::{Figures, Header, StepCodec};
 use ::compress::lossless::{ByteCodec, PackOptions, Packed, Packer, Unpacker};
 use ::compress::pvtc::packed::Packing;
 use ::compress::pvtc::{Encoder, Layout};
-use ::compress::Extent3;
 use ::render::gpu::Gpu;
 use ::render::renderer::{Quality, Renderer};
 use ::render::scene::{Scene, TextureFormat};
 use ::render::volume::{Affine, Grid, Rescale, Samples};
-use serde_json::json;
+use serde_json::{Value, json};
 
-use super::bench::Bench;
+use super::bench::{Bench, psnr};
 use super::input::Input;
 use super::{Failure, Terminal, check_folder, compress, input, say};
 use crate::case::Volume;
 use crate::cli::{CompressArgs, EncoderName, Format, SecondStage};
 use crate::load::Progress;
+use crate::save::choice::{self, Choice, Machine};
 use crate::save::series::{self, Quantiser, SeriesError, SeriesOptions, decode_step, encode_group};
 use crate::scene;
 use crate::steps::{Steps, packed_step};
@@ -61,21 +63,27 @@ impl Format {
 ///
 /// # Errors
 /// [`Failure`].
-pub(super) fn compress(args: &CompressArgs, codec: StepCodec) -> Result<(), Failure> {
+pub(super) fn compress(args: &CompressArgs) -> Result<(), Failure> {
     check_folder(&args.out)?;
     let input = input::open(&args.input)?;
     let (volume, steps) = steps(&input, &args.input)?;
     let key = crate::case::assets::Key::of_volume(volume);
     let modality = input.assets.asset(&key).and_then(|a| a.modality.clone()).unwrap_or_default();
-    let options = SeriesOptions { codec, encoder: args.encoder.of_codec(), byte_codec: args.second.of_codec() };
     let pool = compress::pool(args.threads.map_or(0, usize::from))?;
+    let (encoder, byte_codec) = (args.encoder.of_codec(), args.second.of_codec());
+    let (options, chosen) = if let Some(codec) = args.format.of_series(args.layout) {
+        (SeriesOptions { codec, encoder, byte_codec }, Value::Null)
+    } else {
+        pool.install(|| choose(steps, args))?
+    };
+    let codec = options.codec;
     let name = &input.case.name;
     let terminal = Terminal::default();
     let written = pool.install(|| series::write(&args.out, steps, name, &modality, options, &terminal))?;
     if args.stats {
         let voxels = written.samples as f64;
         say(&json!({
-            "codec": codec.to_string(), "encoder": args.encoder.name(), "second": options.byte_codec.name(),
+            "codec": codec.to_string(), "chosen": chosen, "encoder": args.encoder.name(), "second": options.byte_codec.name(),
             "steps": written.steps, "threads": pool.current_num_threads(),
             "sample_bytes": written.samples, "payload_bytes": written.payload_bytes,
             "file_bytes": written.file_bytes,
@@ -88,6 +96,62 @@ pub(super) fn compress(args: &CompressArgs, codec: StepCodec) -> Result<(), Fail
         .to_string())?;
     }
     Ok(())
+}
+
+/// What keeps to the goal, tried on steps from the middle of the series; and what was found, as JSON.
+fn choose(steps: &Steps, args: &CompressArgs) -> Result<(SeriesOptions, Value), Failure> {
+    let count = steps.times_secs().len();
+    let few = choice::SAMPLE_STEPS.min(count);
+    let bytes = Bytes::new(steps, 1, (count - few) / 2..(count - few) / 2 + few)?;
+    let alike = choice::likeness(&bytes.steps, bytes.extent).map_err(|e| Failure::Other(e.to_string()))?;
+    let machine = Machine { disk_bytes_per_sec: args.disk * 1e6, threads: rayon::current_num_threads() };
+    // Without a device nothing is drawn, and sending takes no time that is known.
+    let mut sender = Gpu::headless().ok().and_then(|gpu| Sender::new(&Arc::new(gpu), &bytes).ok());
+    let mut send = |codec, payload| match &mut sender {
+        Some(sender) => sender.secs(codec, payload),
+        None => Ok(0.0),
+    };
+    let trials = choice::trials(&bytes.steps, bytes.extent, choice::schemes(), machine, &mut send);
+    let trials = trials.map_err(|e| Failure::Other(e.to_string()))?;
+    let found = choice::choose(&trials, args.goal, count);
+    let found =
+        found.ok_or_else(|| Failure::Other("no codec could be tried; please report this".to_owned()))?;
+    let Choice { trial, meets_goal } = found;
+    let options =
+        SeriesOptions { codec: trial.codec, encoder: args.encoder.of_codec(), byte_codec: trial.byte_codec };
+    let chosen = json!({
+        "meets_goal": meets_goal, "tried": trials.len(), "sample_steps": few,
+        "spatial_similarity": alike.spatial, "temporal_similarity": alike.temporal,
+        "expected_psnr_db": Some(trial.psnr_db).filter(|p| p.is_finite()),
+        "expected_bytes": trial.bytes * count as f64, "expected_steps_per_s": 1.0 / trial.secs,
+    });
+    Ok((options, chosen))
+}
+
+/// Sends steps to a device and says how long they take.
+pub(super) struct Sender<'a> {
+    renderer: Renderer,
+    bytes: &'a Bytes,
+}
+
+impl<'a> Sender<'a> {
+    pub(super) fn new(gpu: &Arc<Gpu>, bytes: &'a Bytes) -> Result<Self, Failure> {
+        Ok(Self { renderer: Renderer::new(Arc::clone(gpu))?, bytes })
+    }
+
+    /// Seconds of one step of a payload, from its bytes to a texture that can be drawn.
+    pub(super) fn secs(&mut self, codec: StepCodec, payload: Vec<u8>) -> Result<f64, String> {
+        let count = usize::from(codec.steps_per_chunk());
+        let header = self.bytes.header(codec);
+        let payload = Arc::new(payload);
+        let begin = Instant::now();
+        for within in 0..count {
+            let step = packed_step(&header, Figures::default(), payload.clone(), within);
+            self.renderer.send_step(&step.map_err(|e| e.to_string())?).map_err(|e| e.to_string())?;
+        }
+        self.renderer.finish().map_err(|e| e.to_string())?;
+        Ok(begin.elapsed().as_secs_f64() / count as f64)
+    }
 }
 
 impl From<SeriesError> for Failure {
@@ -137,25 +201,34 @@ pub(super) struct Bytes {
 }
 
 impl Bytes {
-    pub(super) fn new(steps: &Steps, enlarge: usize) -> Result<Self, Failure> {
+    pub(super) fn new(steps: &Steps, enlarge: usize, which: Range<usize>) -> Result<Self, Failure> {
         let fault = || Failure::Unfit(steps.fault().unwrap_or_else(|| "a step cannot be read".to_owned()));
         let first = steps.grid(0).ok_or_else(fault)?;
         let quantiser = Quantiser::new(steps.range(), series::unit(&first), false);
         let large = first.extent().map(|n| n * enlarge);
         let extent = Extent3::new(large.map(|n| u32::try_from(n).unwrap_or(u32::MAX)))
             .map_err(|e| Failure::Usage(e.to_string()))?;
-        let mut all = Vec::with_capacity(steps.times_secs().len());
-        for step in 0..steps.times_secs().len() {
+        let times_secs = steps.times_secs().get(which.clone()).unwrap_or_default().to_vec();
+        let mut all = Vec::with_capacity(which.len());
+        for step in which {
             let grid = steps.grid(step).ok_or_else(fault)?;
             let bytes = quantiser.bytes(&grid);
             all.push(if enlarge == 1 { bytes } else { enlarged(&bytes, grid.extent(), enlarge) });
         }
         let place = *first.world_from_voxel() * shrink(enlarge);
-        Ok(Self { extent, steps: all, times_secs: steps.times_secs().to_vec(), quantiser, place })
+        Ok(Self { extent, steps: all, times_secs, quantiser, place })
     }
 
     pub(super) fn voxels(&self) -> f64 {
         (self.extent.voxels() * self.steps.len()) as f64
+    }
+
+    /// A header that places the steps as they lie.
+    pub(super) fn header(&self, codec: StepCodec) -> Header {
+        let mut header = Header::new(self.extent, codec, ByteCodec::Store);
+        (header.value_scale, header.value_offset) = (self.quantiser.scale, self.quantiser.offset);
+        header.world_from_voxel = self.place.to_row_major();
+        header
     }
 
     /// All steps through the first stage, a payload a group.
@@ -168,7 +241,8 @@ impl Bytes {
     fn grid(&self, samples: Vec<u8>) -> Result<Grid, Failure> {
         let rescale = Rescale { slope: self.quantiser.scale, intercept: self.quantiser.offset };
         let extent = self.extent.sizes().map(|n| n as usize);
-        Grid::new(extent, Samples::U8(samples), rescale, self.place).map_err(|e| Failure::Other(e.to_string()))
+        Grid::new(extent, Samples::U8(samples), rescale, self.place)
+            .map_err(|e| Failure::Other(e.to_string()))
     }
 }
 
@@ -231,9 +305,8 @@ impl Lost {
         }
         let Some((original_before, decoded_before)) = before else { return };
         let change = |now: &[u8], before: &[u8], i: usize| i64::from(now[i]) - i64::from(before[i]);
-        let squares = (0..original.len()).map(|i| {
-            (change(decoded, decoded_before, i) - change(original, original_before, i)).pow(2)
-        });
+        let squares = (0..original.len())
+            .map(|i| (change(decoded, decoded_before, i) - change(original, original_before, i)).pow(2));
         self.squares_of_change += squares.sum::<i64>() as f64;
     }
 
@@ -252,14 +325,10 @@ impl Lost {
     }
 }
 
-fn psnr(mean_square: f64) -> Option<f64> {
-    (mean_square > 0.0).then(|| 10.0 * (255.0 * 255.0 / mean_square).log10())
-}
-
 /// `bench series`: every codec with every second stage, one thread for each measurement of speed.
 pub(super) fn bench(input: &Input, path: &Path, bench: &mut Bench) -> Result<(), Failure> {
     let (volume, steps) = steps(input, path)?;
-    let bytes = Bytes::new(steps, bench.enlarge())?;
+    let bytes = Bytes::new(steps, bench.enlarge(), 0..steps.times_secs().len())?;
     let gpu = Arc::new(Gpu::headless()?);
     let pool = compress::pool(1)?;
     let mut scene = scene::scene(&input.case, &input.assets);
@@ -354,11 +423,8 @@ impl FirstStage {
         let Some(item) = scene.volumes.first_mut() else { return Ok(None) };
         let middle = bytes.steps.len() / 2;
         let group = usize::from(codec.steps_per_chunk());
-        let mut header = ::compress::container::Header::new(bytes.extent, codec, ByteCodec::Store);
-        (header.value_scale, header.value_offset) = (bytes.quantiser.scale, bytes.quantiser.offset);
-        header.world_from_voxel = bytes.place.to_row_major();
         let payload = Arc::new(self.payloads[middle / group].clone());
-        let packed = packed_step(&header, Default::default(), payload, middle % group)
+        let packed = packed_step(&bytes.header(codec), Figures::default(), payload, middle % group)
             .map_err(|e| Failure::Other(e.to_string()))?;
         item.grid = Arc::new(bytes.grid(bytes.steps[middle].clone())?);
         item.texture = TextureFormat::R16;
@@ -437,11 +503,5 @@ mod tests {
         assert_eq!((count, largest, percentile), (4000.0, 10, 3), "one in 2000 is off by 10");
         assert!((mean_square - 0.095).abs() < 1e-12, "{mean_square}");
         assert_eq!(lost.squares_of_change, 0.0, "the loss does not flicker");
-    }
-
-    #[test]
-    fn nothing_lost_has_no_ratio() {
-        assert_eq!(psnr(0.0), None, "JSON has no infinity");
-        assert!((psnr(1.0).expect("dB") - 48.1308).abs() < 1e-4, "of an error of one");
     }
 }

@@ -1,10 +1,13 @@
-//! A folder: its DICOM files together, every other file on its own.
+//! A folder: its DICOM files together, volumes with numbered names as one series, every other file on its own.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use render::volume::{Grid, Series};
 
 use super::detect::{self, Format};
-use super::{Item, Limits, LoadError, Note, Progress, Severity, dicom};
+use super::{Content, Item, Limits, LoadError, Note, Progress, Severity, dicom};
 
 /// Folders nested deeper are not looked into.
 const MAX_DEPTH: usize = 8;
@@ -49,6 +52,7 @@ pub(super) fn open(path: &Path, limits: &Limits, progress: &dyn Progress) -> Res
     for (format, file) in others {
         keep(format.read(&file, limits, progress))?;
     }
+    let mut items = numbered(items);
     let count = failures.len();
     match (items.first_mut(), failures.into_iter().next()) {
         (None, Some(error)) => return Err(error),
@@ -61,6 +65,76 @@ pub(super) fn open(path: &Path, limits: &Limits, progress: &dyn Progress) -> Res
         (Some(_), None) => {}
     }
     Ok(items)
+}
+
+/// Volumes whose names differ in a number only, and that lie in one frame, are the steps of one series.
+fn numbered(items: Vec<Item>) -> Vec<Item> {
+    let mut rest = Vec::new();
+    let mut groups: BTreeMap<(String, String), Vec<(u64, Item)>> = BTreeMap::new();
+    for item in items {
+        match (number_in(&item.name), &item.content) {
+            (Some((before, number, after)), Content::Volume(_)) => {
+                groups.entry((before, after)).or_default().push((number, item));
+            }
+            _ => rest.push(item),
+        }
+    }
+    for mut group in groups.into_values() {
+        group.sort_by_key(|(number, _)| *number);
+        let grids: Vec<&Grid> = group.iter().filter_map(|(_, item)| grid_of(item)).collect();
+        let same = |a: &Grid, b: &Grid| {
+            a.extent() == b.extent()
+                && a.world_from_voxel() == b.world_from_voxel()
+                && a.samples().kind() == b.samples().kind()
+        };
+        let is_series = grids.len() > 2
+            && grids.windows(2).all(|pair| same(pair[0], pair[1]))
+            && group.windows(2).all(|pair| pair[0].0 < pair[1].0);
+        if !is_series {
+            rest.extend(group.into_iter().map(|(_, item)| item));
+            continue;
+        }
+        let times = group.iter().map(|(number, _)| *number as f64).collect();
+        let (mut steps, mut first) = (Vec::new(), None);
+        let mut notes = Vec::new();
+        for (_, item) in group {
+            let Item { name, format, modality, content, notes: its } = item;
+            first.get_or_insert((name, format, modality));
+            notes.extend(its);
+            if let Content::Volume(grid) = content {
+                steps.push(Arc::new(grid));
+            }
+        }
+        notes.dedup();
+        let text = format!(
+            "{} volumes of one frame, whose names differ in a number only, were taken as the steps of one series; \
+             the numbers as seconds.",
+            steps.len()
+        );
+        notes.insert(0, Note { severity: Severity::Caution, code: "folder.series", text });
+        // Checked above: one frame, and numbers that rise.
+        if let (Ok(series), Some((name, format, modality))) = (Series::new(steps, times), first) {
+            rest.push(Item { name, format, modality, content: Content::Series(series), notes });
+        }
+    }
+    rest
+}
+
+fn grid_of(item: &Item) -> Option<&Grid> {
+    match &item.content {
+        Content::Volume(grid) => Some(grid),
+        _ => None,
+    }
+}
+
+/// The last number in a name, and what stands before and after it.
+fn number_in(name: &str) -> Option<(String, u64, String)> {
+    let end = name.rfind(|c: char| c.is_ascii_digit())?.checked_add(1)?;
+    let head = name.get(..end)?;
+    let start = head.rfind(|c: char| !c.is_ascii_digit()).map_or(0, |i| i.saturating_add(1));
+    let start = (start..end).find(|i| head.is_char_boundary(*i))?;
+    let number = head.get(start..)?.parse().ok()?;
+    Some((head.get(..start)?.to_owned(), number, name.get(end..)?.to_owned()))
 }
 
 fn list(folder: &Path, depth: usize, limits: &Limits, files: &mut Vec<PathBuf>) -> Result<(), LoadError> {
@@ -111,4 +185,49 @@ fn listed_by_others(files: &[(Format, PathBuf)]) -> BTreeSet<PathBuf> {
         }
     }
     listed
+}
+
+#[cfg(test)]
+mod tests {
+    use render::volume::{Affine, Rescale, Samples};
+
+    use super::*;
+
+    fn item(name: &str, sizes: [usize; 3]) -> Item {
+        let samples = Samples::U8(vec![0; sizes.iter().product()]);
+        let grid = Grid::new(sizes, samples, Rescale::default(), Affine::identity()).expect("a grid");
+        let (name, modality, notes) = (name.to_owned(), None, Vec::new());
+        Item { name, format: "NRRD", modality, content: Content::Volume(grid), notes }
+    }
+
+    #[test]
+    fn numbered_volumes_of_one_frame_are_one_series_in_the_order_of_their_numbers() {
+        let names = ["beat_10", "beat_2", "beat_1"];
+        let mut items: Vec<Item> = names.map(|name| item(name, [2, 1, 1])).into();
+        items.push(item("mask", [2, 1, 1]));
+        let found = numbered(items);
+        assert_eq!(found.len(), 2, "a series and the mask");
+        let Content::Series(series) = &found[1].content else {
+            panic!("a series, not {:?}", found[1].content)
+        };
+        assert_eq!(series.times_secs(), [1.0, 2.0, 10.0], "by number, not by letter");
+        assert_eq!(found[1].notes[0].code, "folder.series", "and it is said");
+    }
+
+    #[test]
+    fn two_volumes_or_those_of_different_frames_stay_apart() {
+        let two = numbered(vec![item("a1", [2, 1, 1]), item("a2", [2, 1, 1])]);
+        assert_eq!(two.len(), 2, "a pair is as likely before and after");
+        let odd = numbered(vec![item("a1", [2, 1, 1]), item("a2", [2, 1, 1]), item("a3", [3, 1, 1])]);
+        assert_eq!(odd.len(), 3, "another size");
+    }
+
+    #[test]
+    fn the_last_number_of_a_name_counts() {
+        let parts = |name| number_in(name).map(|(a, n, b)| format!("{a}|{n}|{b}"));
+        assert_eq!(parts("t2_step007_x"), Some("t2_step|7|_x".to_owned()), "the last");
+        assert_eq!(parts("42"), Some("|42|".to_owned()), "nothing else");
+        assert_eq!(parts("größe"), None, "none");
+        assert_eq!(parts("é9"), Some("é|9|".to_owned()), "after a letter of two bytes");
+    }
 }

@@ -3,6 +3,7 @@
 //! Everything is made in memory and written by [`crate::case::file::write_whole`], but for `series`, which writes as
 //! it goes under another name; so a file is whole or not there.
 
+pub mod choice;
 pub mod nrrd;
 pub mod picture;
 pub mod series;

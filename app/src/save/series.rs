@@ -229,7 +229,8 @@ pub fn write(
         if !progress.step("compressing steps", chunk * group, written.steps) {
             return Err(SeriesError::Cancelled);
         }
-        let grids: Vec<Arc<Grid>> = (0..times.len()).map(|i| grid(chunk * group + i)).collect::<Result<_, _>>()?;
+        let grids: Vec<Arc<Grid>> =
+            (0..times.len()).map(|i| grid(chunk * group + i)).collect::<Result<_, _>>()?;
         let samples: Vec<Vec<u8>> =
             grids.iter().map(|g| if wide { quantiser.words(g) } else { quantiser.bytes(g) }).collect();
         let begin = Instant::now();

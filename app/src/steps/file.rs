@@ -95,13 +95,8 @@ impl SeriesFile {
         let file_bytes = std::fs::metadata(path).map(|m| m.len()).map_err(|e| read(e.into()))?;
         let stream = Stream::spawn(reader, Options::default())
             .map_err(|source| SeriesFileError::Threads { source, path: path.to_owned() })?;
-        let playing = Playing {
-            stream,
-            order: None,
-            chunks: VecDeque::new(),
-            grids: VecDeque::new(),
-            fault: None,
-        };
+        let playing =
+            Playing { stream, order: None, chunks: VecDeque::new(), grids: VecDeque::new(), fault: None };
         let ends = [0.0, 255.0].map(|stored| header.value_offset + header.value_scale * stored);
         let range = [ends[0].min(ends[1]), ends[0].max(ends[1])];
         let playing = Mutex::new(playing);
@@ -228,7 +223,8 @@ impl SeriesFile {
         let repeat = if is_looped { Repeat::Loop } else { Repeat::Once };
         let mut playing = self.playing();
         let chunk = self.chunk_of(step);
-        let goes_on = playing.order.is_some_and(|(d, r, next)| (d, r) == (direction, repeat) && next == chunk);
+        let goes_on =
+            playing.order.is_some_and(|(d, r, next)| (d, r) == (direction, repeat) && next == chunk);
         let is_there = playing.way() == (direction, repeat) && playing.at_hand(step).is_some();
         if !goes_on && !is_there {
             playing.seek(chunk, step, (direction, repeat));

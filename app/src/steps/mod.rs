@@ -7,6 +7,8 @@
 
 mod file;
 mod packed;
+#[cfg(test)]
+mod tests;
 
 use std::path::Path;
 use std::sync::Arc;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use render::volume::{
-    Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Side, Transfer, TriangleMesh, Vector,
+    Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Series, Side, Transfer, TriangleMesh, Vector,
 };
 
 use super::register_all;
@@ -16,6 +16,7 @@ use crate::host::overlay::Overlay;
 use crate::host::registry::Registry;
 use crate::host::tool::ToolId;
 use crate::host::views::Views;
+use crate::steps::Steps;
 
 /// What a tool is drawn in.
 #[derive(Default)]
@@ -86,7 +87,7 @@ fn ids() -> Vec<ToolId> {
 
 #[test]
 fn every_registered_panel_draws_with_and_without_a_case() {
-    assert!(ids().len() >= 5, "volumes, transfer, cutting, fragments, implants");
+    assert!(ids().len() >= 6, "volumes, transfer, cutting, fragments, implants, player");
     for id in ids() {
         let mut full = panel(bench(), id);
         full.run();
@@ -162,4 +163,50 @@ fn an_implant_goes_to_the_crosshair() {
     let middle = pose.point(&Point::new(1.0, 2.0, 0.0));
     assert_eq!(id, "plate", "the chosen one");
     assert!((middle - Point::new(11.0, 12.0, 13.0)).norm() < 1e-12, "its middle is there: {middle}");
+}
+
+/// A bench whose volume has four steps, half a second apart.
+fn moving() -> Bench {
+    let mut bench = bench();
+    let grid = |value: i16| {
+        let samples = Samples::I16(vec![value; 512]);
+        Arc::new(Grid::new([8, 8, 8], samples, Rescale::default(), Affine::identity()).expect("grid"))
+    };
+    let series = Series::new((0..4).map(grid).collect(), vec![0.0, 0.5, 1.0, 1.5]).expect("series");
+    let key = Key::of_volume(&bench.case.volumes[0]);
+    bench.assets.insert(asset(key, Data::Steps(Arc::new(Steps::in_memory(series)))));
+    bench
+}
+
+#[test]
+fn the_player_steps_and_plays() {
+    let step = |step| Edit::SetStep { id: "ct".to_owned(), step };
+    let mut player = panel(moving(), ToolId("player"));
+    player.run();
+    player.get_by_label_contains("step 1 of 4");
+    player.get_by_label("Next").click();
+    player.run();
+    assert_eq!(player.state().edits, [step(1)], "one on");
+    player.state_mut().edits.clear();
+    player.get_by_label("Last").click();
+    player.run();
+    assert_eq!(player.state().edits, [step(3)], "the end");
+    player.state_mut().edits.clear();
+    player.get_by_label("Play").click();
+    // It asks for frame after frame: a fixed number is run.
+    player.run_steps(40);
+    let edits = &player.state().edits;
+    assert!(!edits.is_empty() && edits.iter().all(|e| matches!(e, Edit::SetStep { .. })), "steps: {edits:?}");
+    player.get_by_label("Pause").click();
+    player.run_steps(2);
+    player.state_mut().edits.clear();
+    player.run_steps(40);
+    assert!(player.state().edits.is_empty(), "it has stopped");
+}
+
+#[test]
+fn the_player_has_nothing_to_play_of_a_still_volume() {
+    let mut player = panel(bench(), ToolId("player"));
+    player.run();
+    player.get_by_label_contains("No volume over time");
 }
