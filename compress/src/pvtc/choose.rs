@@ -254,8 +254,11 @@ impl Sample {
             for z in 0..deep {
                 for y in 0..down {
                     let origin = origin(y / BOX[1]);
-                    // The last voxel is repeated past the edges, as encoders do.
-                    let at = |axis: usize, i: usize| (origin[axis] * BOX[axis] + i).min(sizes[axis] - 1);
+                    // Boxes lie inside, or as far as they can: repeated voxels are easier than those of the volume.
+                    let at = |axis: usize, i: usize| {
+                        let first = (origin[axis] * BOX[axis]).min(sizes[axis].saturating_sub(BOX[axis]));
+                        (first + i).min(sizes[axis] - 1)
+                    };
                     let line = (at(2, z) * sizes[1] + at(1, y % BOX[1])) * sizes[0];
                     voxels.extend((0..across).map(|x| step[line + at(0, x)]));
                 }
