@@ -56,6 +56,11 @@ impl Extent3 {
         Ok(Self { voxels })
     }
 
+    /// A small extent: 255³ times 16 bytes can be addressed on any machine. A size of 0 is taken as 1.
+    pub(crate) fn small(voxels: [u8; 3]) -> Self {
+        Self { voxels: voxels.map(|size| u32::from(size.max(1))) }
+    }
+
     /// The sizes, `[x, y, z]`.
     pub fn sizes(self) -> [u32; 3] {
         self.voxels

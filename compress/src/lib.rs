@@ -41,7 +41,9 @@ mod limits;
 pub mod lossless;
 pub mod pvtc;
 pub mod quality;
+mod simd;
 pub mod stream;
+pub mod texture;
 
 pub use bc::BlockFormat;
 pub use extent::{Extent3, ExtentError};

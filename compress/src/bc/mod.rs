@@ -21,6 +21,7 @@
 mod bc1;
 mod bc3;
 mod bc4;
+mod bc7;
 mod block;
 mod endpoints;
 
@@ -37,11 +38,14 @@ pub enum BlockFormat {
     Bc3,
     /// One channel: two 8-bit end points, 3-bit indices; unsigned.
     Bc4,
+    /// Colour and alpha together in one of eight modes, end points of up to 8 bits, indices of up to 4: the accurate
+    /// tier for colour, of the same size as BC3.
+    Bc7,
 }
 
 impl BlockFormat {
     /// Every format.
-    pub const ALL: [Self; 3] = [Self::Bc1, Self::Bc3, Self::Bc4];
+    pub const ALL: [Self; 4] = [Self::Bc1, Self::Bc3, Self::Bc4, Self::Bc7];
 
     /// The format's short name: `"bc3"`.
     pub fn name(self) -> &'static str {
@@ -49,6 +53,7 @@ impl BlockFormat {
             Self::Bc1 => "bc1",
             Self::Bc3 => "bc3",
             Self::Bc4 => "bc4",
+            Self::Bc7 => "bc7",
         }
     }
 
@@ -56,7 +61,7 @@ impl BlockFormat {
     pub fn block_bytes(self) -> usize {
         match self {
             Self::Bc1 | Self::Bc4 => 8,
-            Self::Bc3 => 16,
+            Self::Bc3 | Self::Bc7 => 16,
         }
     }
 
@@ -68,7 +73,7 @@ impl BlockFormat {
     /// Bytes of one voxel on the uncompressed side: 4 for colour, 1 for a scalar.
     pub fn channels(self) -> usize {
         match self {
-            Self::Bc1 | Self::Bc3 => 4,
+            Self::Bc1 | Self::Bc3 | Self::Bc7 => 4,
             Self::Bc4 => 1,
         }
     }
@@ -95,18 +100,36 @@ pub enum ColourWeight {
     Equal,
 }
 
+/// How much an encoder tries.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Level {
+    /// For a transfer function that is being changed: what costs little.
+    Fast,
+    /// For a volume that stays: all that is known to help.
+    #[default]
+    Best,
+}
+
 /// Choices of an encoder.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct EncodeOptions {
     /// How voxels share in the colours of a BC3 block; of no effect in BC1, which is opaque, and BC4.
     pub colour_weight: ColourWeight,
+    /// How much the encoder tries.
+    pub level: Level,
 }
 
 impl EncodeOptions {
     /// These options with another weight of colours.
     pub fn with_colour_weight(mut self, colour_weight: ColourWeight) -> Self {
         self.colour_weight = colour_weight;
+        self
+    }
+
+    /// These options with another level.
+    pub fn with_level(mut self, level: Level) -> Self {
+        self.level = level;
         self
     }
 }
@@ -191,6 +214,11 @@ pub fn encode_volume_with(
             block::encode(samples, extent, &mut blocks, |texels| bc3::encode(texels, options.colour_weight));
         }
         BlockFormat::Bc4 => block::encode(samples, extent, &mut blocks, bc4::encode),
+        BlockFormat::Bc7 => {
+            block::encode_rows(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+                bc7::encode_row(rows, blocks, options);
+            });
+        }
     }
     Ok(blocks)
 }
@@ -215,12 +243,45 @@ pub fn decode_volume(format: BlockFormat, blocks: &[u8], extent: Extent3) -> Res
         BlockFormat::Bc1 => block::decode(blocks, extent, &mut samples, bc1::decode),
         BlockFormat::Bc3 => block::decode(blocks, extent, &mut samples, bc3::decode),
         BlockFormat::Bc4 => block::decode(blocks, extent, &mut samples, bc4::decode),
+        BlockFormat::Bc7 => block::decode(blocks, extent, &mut samples, bc7::decode),
     }
     Ok(samples)
 }
 
+pub(crate) fn constant(texel: [u8; 4]) -> [u8; 16] {
+    bc3::encode(&[texel; 16], ColourWeight::Equal)
+}
+
+pub(crate) fn decode_colours(format: BlockFormat, block: &[u8]) -> [[u8; 4]; 16] {
+    match format {
+        BlockFormat::Bc1 => bc1::decode(block.try_into().unwrap()),
+        _ => bc3::decode(block.try_into().unwrap()),
+    }
+}
+
+pub(crate) fn decode_scalars(block: &[u8]) -> [u8; 16] {
+    bc4::decode(block.try_into().unwrap()).map(|[v]| v)
+}
+
+pub(crate) fn encode_row(format: BlockFormat, rows: [&[[u8; 4]]; 4], out: &mut [u8], options: EncodeOptions) {
+    for (i, block) in out.chunks_exact_mut(format.block_bytes()).enumerate() {
+        let texels = std::array::from_fn(|k| rows[k / 4][4 * i + k % 4]);
+        match format {
+            BlockFormat::Bc1 => block.copy_from_slice(&bc1::encode(&texels)),
+            _ => block.copy_from_slice(&bc3::encode(&texels, options.colour_weight)),
+        }
+    }
+}
+
+pub(crate) fn encode_scalar_row(rows: [&[u8]; 4], out: &mut [u8], _: EncodeOptions) {
+    for (i, block) in out.chunks_exact_mut(8).enumerate() {
+        let texels = std::array::from_fn(|k| [rows[k / 4][4 * i + k % 4]]);
+        block.copy_from_slice(&bc4::encode(&texels));
+    }
+}
+
 /// `len` zero bytes, or none where there is no memory for them.
-fn zeroed(len: usize) -> Option<Vec<u8>> {
+pub(crate) fn zeroed(len: usize) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();
     bytes.try_reserve_exact(len).ok()?;
     bytes.resize(len, 0);

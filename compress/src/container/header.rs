@@ -15,7 +15,7 @@ pub(super) const HEADER_BYTES: usize = 512;
 const CHECKED_BYTES: usize = HEADER_BYTES - 4;
 
 /// The first 8 bytes of every series file.
-const IDENTIFIER: [u8; 8] = [0x89, b'O', b'S', b'T', b'\r', b'\n', 0x1A, b'\n'];
+pub const IDENTIFIER: [u8; 8] = [0x89, b'O', b'S', b'T', b'\r', b'\n', 0x1A, b'\n'];
 
 /// Most bytes of the texts.
 const NAME_BYTES: usize = 128;

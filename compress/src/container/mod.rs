@@ -18,7 +18,7 @@ mod write;
 
 pub use codec::StepCodec;
 pub use footer::Figures;
-pub use header::Header;
+pub use header::{Header, IDENTIFIER};
 pub use read::{ReadError, Reader};
 pub use write::{FileWriter, WriteError, Writer};
 

@@ -77,6 +77,7 @@ pub(super) fn says(found: &[u8], format: TextureFormat) -> bool {
 /// Colour model, edge of a block in x and y, and samples by their offset.
 fn layout(format: TextureFormat) -> (u8, u8, Vec<Sample>) {
     let block = |offset, channel| Sample { offset, length: 64, channel, upper: u32::MAX };
+    let whole = Sample { offset: 0, length: 128, channel: 0, upper: u32::MAX };
     let number = |offset, length: u8, channel| Sample { offset, length, channel, upper: (1 << length) - 1 };
     match format {
         // KHR_DF_MODEL_BC1A; channel 1 says that alpha may be present.
@@ -85,6 +86,8 @@ fn layout(format: TextureFormat) -> (u8, u8, Vec<Sample>) {
         TextureFormat::Block(BlockFormat::Bc3) => (130, 4, vec![block(0, ALPHA), block(64, 0)]),
         // KHR_DF_MODEL_BC4
         TextureFormat::Block(BlockFormat::Bc4) => (131, 4, vec![block(0, 0)]),
+        // KHR_DF_MODEL_BC7
+        TextureFormat::Block(BlockFormat::Bc7) => (134, 4, vec![whole]),
         // KHR_DF_MODEL_RGBSDA: red 0, green 1, blue 2.
         TextureFormat::R8 => (1, 1, vec![number(0, 8, 0)]),
         TextureFormat::R16 => (1, 1, vec![number(0, 16, 0)]),

@@ -62,10 +62,11 @@ pub enum TextureFormat {
 
 impl TextureFormat {
     /// Every format.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Block(BlockFormat::Bc1),
         Self::Block(BlockFormat::Bc3),
         Self::Block(BlockFormat::Bc4),
+        Self::Block(BlockFormat::Bc7),
         Self::R8,
         Self::R16,
         Self::Rgba8,
@@ -77,6 +78,7 @@ impl TextureFormat {
             Self::Block(BlockFormat::Bc1) => 133, // VK_FORMAT_BC1_RGBA_UNORM_BLOCK
             Self::Block(BlockFormat::Bc3) => 137, // VK_FORMAT_BC3_UNORM_BLOCK
             Self::Block(BlockFormat::Bc4) => 139, // VK_FORMAT_BC4_UNORM_BLOCK
+            Self::Block(BlockFormat::Bc7) => 145, // VK_FORMAT_BC7_UNORM_BLOCK
             Self::R8 => 9,                        // VK_FORMAT_R8_UNORM
             Self::R16 => 70,                      // VK_FORMAT_R16_UNORM
             Self::Rgba8 => 37,                    // VK_FORMAT_R8G8B8A8_UNORM

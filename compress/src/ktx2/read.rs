@@ -33,7 +33,7 @@ pub enum ReadError {
     },
     /// A field says something that is valid in KTX2, but is not a volume in one of the formats known here.
     #[error(
-        "{field} is {value}, which is not supported: convert the file to a 3D texture of BC1, BC3, BC4, R8, R16 or RGBA8, plain or with zstd"
+        "{field} is {value}, which is not supported: convert the file to a 3D texture of BC1, BC3, BC4, BC7, R8, R16 or RGBA8, plain or with zstd"
     )]
     Unsupported {
         /// The header's field.

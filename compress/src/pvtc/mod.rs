@@ -60,10 +60,12 @@
 //! while another rises can share its table; decoders do not care.
 //!
 //! Parts: `ends` the fields and values, `encode` and `fit` the two encoders, `decode` the decoder; [`packed`] is the
-//! other way to a texture, PVTC-TE and PVTC-SE, which texture hardware decodes.
+//! other way to a texture, PVTC-TE and PVTC-SE, which texture hardware decodes; [`choose`] measures which of all these
+//! suits a series and a target.
 //!
 //! Source: *Yamada*, sections 2 and 3; *Nagayasu*, section 3.2.
 
+pub mod choose;
 mod decode;
 mod encode;
 mod ends;
@@ -166,6 +168,14 @@ impl Layout {
     /// Encoded bytes for each byte of samples, edges apart: (4 + 4·S) / (16·S·T).
     pub fn rate(self) -> f64 {
         (HEAD_BYTES + self.table_bytes()) as f64 / (EDGE * EDGE * usize::from(self.s * self.t)) as f64
+    }
+
+    /// Where the end points of a step of the group, from 0, lie in the two words of a head: the lowest bit, and the
+    /// greatest number. None past the last step.
+    pub fn field(self, step: usize) -> Option<(u32, u32)> {
+        let steps = usize::from(self.t);
+        let field = (step < steps).then(|| ends::Field::new(steps, step))?;
+        Some((field.shift, field.most))
     }
 
     /// Bytes of the table of a sub-volume.

@@ -89,6 +89,12 @@ impl Chunk {
     }
 }
 
+impl AsRef<[u8]> for Chunk {
+    fn as_ref(&self) -> &[u8] {
+        &self.payload
+    }
+}
+
 impl fmt::Debug for Chunk {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut debug = f.debug_struct("Chunk");
@@ -161,6 +167,11 @@ impl Stream {
     /// The time of each step, in s: finite and rising.
     pub fn times_secs(&self) -> &[f64] {
         &self.times_secs
+    }
+
+    /// Chunks of the series.
+    pub fn chunks(&self) -> u32 {
+        self.chunks.len() as u32
     }
 
     /// Wants the chunk of `step`, then those after it in `direction`; with [`Repeat::Loop`], round and round.

@@ -2,7 +2,11 @@
 //! next to the sentence it stands for. Slow, plain, and sharing nothing with the crate.
 //!
 //! Source: Khronos Data Format Specification 1.4, "S3TC Compressed Texture Image Formats" and "RGTC Compressed
-//! Texture Image Formats".
+//! Texture Image Formats"; for BC7 see `bc7`.
+
+mod bc7;
+
+pub(crate) use bc7::bc7_texel;
 
 /// A real number in [0, 1] as 8 bits. Halves go up; the small number is for a half that floating point made less.
 fn byte(value: f64) -> u8 {
