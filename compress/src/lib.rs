@@ -12,11 +12,13 @@
 //! | [`BlockFormat::Bc7`] | 4×4×1 voxels in 16 bytes | 8 | no | R, G, B, A | encoder and decoder |
 //! | [`pvtc`] <S, T> | 4×4×S voxels, T steps in 4 + 4·S bytes | 8·(4 + 4·S)/(16·S·T) | no | one, 8-bit, over time | encoders and decoder |
 //! | [`pvtc::packed`], TE and SE | 4×4×1 texels, three samples each, in 8 bytes | 4/3 | no | one, 8-bit, over time | encoder and decoder |
+//! | [`lossless`]: LZO, LZ4, zstd | a chunk of a series | by content | yes | any bytes | packer and unpacker |
 //! | [`ktx2`], zstd inside | the whole level | by content | yes | those of its format | writer and reader |
 //!
 //! How they go together: [`bc::encode_volume`] turns samples into blocks, [`ktx2::write()`] puts them into a file,
 //! [`ktx2::read()`] checks a file and gives them back, [`bc::decode_volume`] makes samples of them again, and
-//! [`quality::compare`] says what was lost. What a lossy codec loses is always measured against the samples
+//! [`quality::compare`] says what was lost. A series goes through [`pvtc`] and [`lossless`] into the file of
+//! [`container`], and comes back through [`stream`], ahead of its player. What a lossy codec loses is always measured against the samples
 //! that were given to it.
 //!
 //! # References
@@ -29,6 +31,8 @@
 //!   Time-Varying Volume" (in Japanese), about 2011: the layouts <S, T> of [`pvtc`].
 //! - *Nagayasu*: D. Nagayasu, F. Ino, K. Hagihara, "Performance and Image Quality Evaluation of Two-Stage Compression
 //!   Method for Accelerating GPU-Based Volume Rendering of Time-Varying Data" (in Japanese), 2006: PVTC-TE and PVTC-SE.
+//! - *LZO*: "LZO stream format as understood by Linux's LZO decompressor", Linux kernel documentation.
+//! - *LZ4*: Y. Collet, "LZ4 Block Format Description", 2022.
 //! - *Doi*: the 4×4×4 work unit of [`bc`] follows Doi's encoder of volumes in DXT5 (BC3).
 
 pub mod bc;

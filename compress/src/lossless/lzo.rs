@@ -18,7 +18,7 @@
 //! byte, then a byte that is not zero. A first byte over 17 stands for a run of so many less 17 literals. Words are
 //! little-endian.
 //!
-//! Source: the description in the Linux kernel, `Documentation/staging/lzo.rst`, without its run-length extension.
+//! Source: *LZO* (`Documentation/staging/lzo.rst` in the kernel), without its run-length extension.
 //! The oracles in the tests are two other implementations.
 #![warn(clippy::arithmetic_side_effects, clippy::indexing_slicing)]
 

@@ -4,8 +4,8 @@
 //! of successive elements is likelier to repeat than the next byte of one element. A plane is all first bytes (or
 //! words) of the elements, then all second ones, and so on; elements keep their order.
 //!
-//! Differences against the left neighbour and against the sub-volume before (as numbers, as fields, by exclusive
-//! or) were tried on real series and made payloads larger for every codec, so there is no such transform here.
+//! Differences against the left neighbour and against the sub-volume before were tried on real series and did not
+//! pay: see `NOTES.md`.
 
 /// A run of equal elements in a payload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,8 +8,6 @@ use compress::{BlockFormat, Extent3};
 use crate::mutate::Random;
 use crate::{Tally, knock};
 
-const FORMATS: [BlockFormat; 3] = [BlockFormat::Bc1, BlockFormat::Bc3, BlockFormat::Bc4];
-
 /// A small extent; once in a while one of any size, which no bytes here can be of.
 fn extent(random: &mut Random) -> Option<Extent3> {
     let size = |random: &mut Random, any| if any { random.next() as u32 } else { random.below(18) as u32 };
@@ -29,7 +27,7 @@ pub(crate) fn bc(door: &'static str) -> Tally {
         door,
         |random| {
             let extent = extent(random)?;
-            let format = *random.pick(&FORMATS);
+            let format = *random.pick(&BlockFormat::ALL);
             Some((format, extent, bytes(random, format.encoded_len(extent))))
         },
         |prepared| {

@@ -1,6 +1,7 @@
 //! The series file: what is written is read, by step; what is damaged, cut off or made to lie is named.
 
 mod damage;
+mod naive;
 mod stream;
 mod writer;
 
