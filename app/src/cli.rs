@@ -8,6 +8,8 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use ::compress::bc::Level;
+use ::compress::pvtc::Layout;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::headless::{self, Failure};
@@ -101,12 +103,24 @@ pub struct CompressArgs {
     /// A data file or folder, or a case, whose first visible volume is taken.
     #[arg(value_name = "IN")]
     pub input: PathBuf,
-    /// The texture's format.
+    /// The format of the texture, or of the series.
     #[arg(long, value_enum)]
     pub format: Format,
-    /// The KTX2 file.
+    /// The KTX2 file of a texture, or the .series file of a volume over time.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
+    /// For blocks: how much is tried.
+    #[arg(long, value_enum, default_value_t = LevelName::Best)]
+    pub level: LevelName,
+    /// For pvtc: slices of a sub-volume (1, 2, 4, 8) and steps together (1 to 4).
+    #[arg(long, value_name = "S,T", value_parser = layout, default_value = "4,2")]
+    pub layout: Layout,
+    /// For pvtc, pvtc-te and pvtc-se: how end points and indices are chosen.
+    #[arg(long, value_enum, default_value_t = EncoderName::Fitted)]
+    pub encoder: EncoderName,
+    /// For a series: what packs the bytes once more, without loss.
+    #[arg(long, value_enum, default_value_t = SecondStage::Zstd)]
+    pub second: SecondStage,
     /// Threads used; all cores if not given. The bytes do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -119,7 +133,48 @@ pub struct CompressArgs {
     pub stats: bool,
 }
 
-/// A texture format that `compress` writes.
+/// How much an encoder of blocks tries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LevelName {
+    /// What costs little.
+    Fast,
+    /// All that helps.
+    Best,
+}
+
+impl LevelName {
+    /// The encoder's level.
+    pub fn of_encoder(self) -> Level {
+        match self {
+            Self::Fast => Level::Fast,
+            Self::Best => Level::Best,
+        }
+    }
+}
+
+/// How PVTC chooses end points and indices. The bytes are as many.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum EncoderName {
+    /// As in the papers: largest and smallest value.
+    MinMax,
+    /// For the least squared error.
+    Fitted,
+}
+
+/// The second, lossless stage of a series.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SecondStage {
+    /// Bytes as they are.
+    None,
+    /// LZO1X.
+    Lzo,
+    /// LZ4.
+    Lz4,
+    /// Zstandard.
+    Zstd,
+}
+
+/// A format that `compress` writes: of a texture, or of a volume over time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Opaque pre-classified colour, 4 bits a voxel.
@@ -134,6 +189,18 @@ pub enum Format {
     R8,
     /// Scalar, 16 bits a voxel.
     R16,
+    /// Pre-classified colour and opacity, 8 bits a voxel, accurate.
+    Bc7,
+    /// Volume over time: PVTC of a layout <S,T>.
+    Pvtc,
+    /// Volume over time: PVTC-TE, three steps in the channels of BC1.
+    PvtcTe,
+    /// Volume over time: PVTC-SE, three slices in the channels of BC1.
+    PvtcSe,
+    /// Volume over time: 8 bits a voxel.
+    Raw8,
+    /// Volume over time: 16 bits a voxel.
+    Raw16,
 }
 
 /// Arguments of `bench`.
@@ -151,6 +218,9 @@ pub struct BenchArgs {
     /// Write SVG plots into this folder.
     #[arg(long, value_name = "DIR")]
     pub plot: Option<PathBuf>,
+    /// For series and play: voxels along each axis for one of the data's, by interpolation.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
+    pub enlarge: u8,
 }
 
 /// A benchmark.
@@ -160,6 +230,10 @@ pub enum BenchName {
     Frame,
     /// Time and error of making textures, beside making uncompressed ones.
     Compress,
+    /// Time and error of the codecs of a volume over time, with each second stage.
+    Series,
+    /// Volumes a second from a file that is in no cache, compressed and not.
+    Play,
 }
 
 /// Arguments of `demo`.
@@ -172,6 +246,14 @@ pub struct DemoArgs {
 
 /// Largest side of a picture; pixels.
 pub const MAX_SIDE: u32 = 16_384;
+
+/// `4,2`.
+fn layout(text: &str) -> Result<Layout, String> {
+    let wrong = || format!("\"{text}\" is no layout: write S,T as in 4,2");
+    let (s, t) = text.split_once(',').ok_or_else(wrong)?;
+    let number = |text: &str| text.trim().parse::<u8>().map_err(|_not_a_number| wrong());
+    Layout::new(number(s)?, number(t)?).map_err(|e| e.to_string())
+}
 
 /// `640x480`.
 fn size(text: &str) -> Result<[u32; 2], String> {
@@ -247,6 +329,14 @@ mod tests {
         assert_eq!(size("640x480"), Ok([640, 480]), "as written");
         for wrong in ["640", "0x10", "10x0", "-1x5", "99999x2", "ax3", "1x2x3", ""] {
             assert!(size(wrong).is_err(), "{wrong} was accepted");
+        }
+    }
+
+    #[test]
+    fn a_layout_is_one_of_those_defined() {
+        assert_eq!(layout("4,2").map(|l| (l.s(), l.t())), Ok((4, 2)), "as written");
+        for wrong in ["4", "3,2", "4,5", "a,b", ""] {
+            assert!(layout(wrong).is_err(), "{wrong} was accepted");
         }
     }
 

@@ -2,8 +2,8 @@
 //!
 //! [`load`] reads files into the world's frame; [`case`] is what is planned, changed only by
 //! [`case::Edit`]; [`scene`] turns a case and its data into what `render` draws; [`headless`] runs jobs
-//! without a display and [`host`] the window, where [`tools`] live; [`save`] writes data files and pictures. [`jobs`] runs what takes long in the
-//! background. [`sample`] makes the built-in hip, [`presets`] names transfer functions.
+//! without a display and [`host`] the window, where [`tools`] live; [`save`] writes data files and pictures. [`steps`]
+//! are a volume over time. [`jobs`] runs what takes long in the background. [`sample`] makes the built-in hip, [`presets`] names transfer functions.
 
 pub mod case;
 pub mod cli;
@@ -15,5 +15,6 @@ pub mod presets;
 pub mod sample;
 pub mod save;
 pub mod scene;
+pub mod steps;
 pub mod tools;
 pub mod ui;

@@ -28,7 +28,8 @@ fn volume(case: &Case, volume: &Volume, assets: &Assets) -> Option<VolumeItem> {
     if !volume.visible {
         return None;
     }
-    let grid = Arc::clone(assets.grid(volume)?);
+    let grid = assets.grid(volume)?;
+    let packed = assets.steps(volume).and_then(|steps| steps.packed(volume.step));
     let mut fragments = case.fragments_of(&volume.id).peekable();
     let pieces: Vec<Piece> = if fragments.peek().is_none() {
         vec![Piece::whole()]
@@ -39,6 +40,7 @@ fn volume(case: &Case, volume: &Volume, assets: &Assets) -> Option<VolumeItem> {
         return None;
     }
     Some(VolumeItem {
+        packed,
         grid,
         pose: volume.pose,
         transfer: Arc::clone(&volume.transfer),

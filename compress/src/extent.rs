@@ -56,6 +56,11 @@ impl Extent3 {
         Ok(Self { voxels })
     }
 
+    /// A small extent: 255³ times 16 bytes can be addressed on any machine. A size of 0 is taken as 1.
+    pub(crate) fn small(voxels: [u8; 3]) -> Self {
+        Self { voxels: voxels.map(|size| u32::from(size.max(1))) }
+    }
+
     /// The sizes, `[x, y, z]`.
     pub fn sizes(self) -> [u32; 3] {
         self.voxels
@@ -79,6 +84,12 @@ impl Extent3 {
     /// All voxels: x·y·z.
     pub fn voxels(self) -> usize {
         self.x() * self.y() * self.z()
+    }
+
+    /// The same volume with `z` slices, at least 1 and at most its own.
+    pub(crate) fn with_slices(self, z: usize) -> Self {
+        let [x, y, most] = self.voxels;
+        Self { voxels: [x, y, u32::try_from(z).unwrap_or(most).clamp(1, most)] }
     }
 
     /// How many 4×4×1 blocks cover the volume, `[x, y, z]`; those at the far edges may be partly outside it.

@@ -6,3 +6,5 @@ mod bc;
 mod ktx2_file;
 mod naive;
 mod phantom;
+mod pvtc;
+mod series;

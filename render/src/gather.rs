@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::gpu::{Gpu, GpuError};
 use crate::passes::slabs::{Kind, MAX_GAPS, Member, Proxy, Spacing, gpu_data};
 use crate::scene::{Scene, Shading, VolumeItem};
-use crate::texture::{Plan, TextureCache, VolumeTexture, is_colour};
+use crate::texture::{Plan, Reading, TextureCache, VolumeTexture};
 use crate::transfer::{NODES, ROWS, Table};
 use crate::view::{Form, View};
 use crate::volume::convex::{ConvexSolid, HalfSpace};
@@ -46,6 +46,7 @@ pub(crate) struct Gathered {
     fragments: Vec<Fragment>,
     pub(crate) members: Vec<Member>,
     pub(crate) textures: Vec<Arc<VolumeTexture>>,
+    pub(crate) textures_sent: u64,
     /// Rows of all tables, [`NODES`] texels each.
     pub(crate) tables: Vec<[f32; 4]>,
     /// What each table is of: a function over a range of values.
@@ -90,6 +91,7 @@ impl Gathered {
             all.add_volume(gpu, item, view, textures, bricks)?;
         }
         textures.forget_unused();
+        all.textures_sent = textures.take_sent();
         bricks.forget_unused(scene);
         for item in &scene.meshes {
             if item.opacity <= 0.0 {
@@ -117,19 +119,19 @@ impl Gathered {
         if item.pieces.is_empty() {
             return Ok(());
         }
-        let bricks = bricks.get(&item.grid);
-        self.counts.bricks += bricks.len() as u64;
-        let Some((span, occupied)) = bricks.occupied(&item.transfer) else {
+        let (bounds, grid_place, range) = if let Some(step) = &item.packed {
+            (Some(step.bounds()), *step.world_from_voxel(), step.range())
+        } else {
+            (self.occupied(item, bricks), *item.grid.world_from_voxel(), item.grid.range())
+        };
+        let Some([low, high]) = bounds else {
             self.counts.fragments_empty += item.pieces.len() as u32;
             return Ok(());
         };
-        self.counts.bricks_occupied += occupied as u64;
-        let low = Point::from(span.map(|s| s[0]));
-        let high = Point::from(span.map(|s| s[1]));
-        let world_from_voxel = item.pose * *item.grid.world_from_voxel();
+        let world_from_voxel = item.pose * grid_place;
         let spacing = world_from_voxel.column_lengths().into_iter().fold(f64::INFINITY, f64::min);
         self.finest_mm = Some(self.finest_mm.map_or(spacing, |f| f.min(spacing)));
-        let table = self.table(&item.transfer, item.grid.range());
+        let table = self.table(&item.transfer, range);
         for piece in &item.pieces {
             let mut solid = ConvexSolid::from_box(low, high);
             let view_from_unmoved = view.view_from_world * piece.pose;
@@ -166,18 +168,24 @@ impl Gathered {
                 continue;
             };
             self.counts.fragments += 1;
-            let plan =
-                Plan::new(&item.grid, &item.transfer, item.texture, bounds, gpu.caps(), &mut self.notes);
-            let texture = textures.get(gpu, &plan)?;
-            let kind = match (is_colour(texture.key.format), item.shading) {
-                (true, Shading::None) => Kind::Color,
-                (true, Shading::Lit) => {
+            let texture = if let Some(step) = &item.packed {
+                textures.step(gpu, step)?
+            } else {
+                let notes = &mut self.notes;
+                let plan = Plan::new(&item.grid, &item.transfer, item.texture, bounds, gpu.caps(), notes);
+                textures.get(gpu, &plan)?
+            };
+            let kind = match (texture.reading, item.shading) {
+                (Reading::Colour, Shading::None) => Kind::Color,
+                (Reading::Colour, Shading::Lit) => {
                     let note = "a pre-classified texture has no gradient: its volume is drawn unlit";
                     self.notes.push(note.to_owned());
                     Kind::Color
                 }
-                (false, Shading::None) => Kind::Scalar,
-                (false, Shading::Lit) => Kind::ScalarLit,
+                (Reading::Scalar { .. }, Shading::None) => Kind::Scalar,
+                (Reading::Scalar { .. }, Shading::Lit) => Kind::ScalarLit,
+                (Reading::Stacked { .. }, Shading::None) => Kind::Stacked,
+                (Reading::Stacked { .. }, Shading::Lit) => Kind::StackedLit,
             };
             let position = self.textures.iter().position(|t| Arc::ptr_eq(t, &texture));
             let position = position.unwrap_or_else(|| {
@@ -190,6 +198,15 @@ impl Gathered {
             self.fragments.push(Fragment { texture, view_from_voxel, planes, cylinders, transfer, table });
         }
         Ok(())
+    }
+
+    /// The box of the bricks of a grid that show anything; none where nothing does.
+    fn occupied(&mut self, item: &VolumeItem, bricks: &mut BrickCache) -> Option<[Point; 2]> {
+        let bricks = bricks.get(&item.grid);
+        self.counts.bricks += bricks.len() as u64;
+        let (span, occupied) = bricks.occupied(&item.transfer)?;
+        self.counts.bricks_occupied += occupied as u64;
+        Some([0, 1].map(|end| Point::from(span.map(|s| s[end]))))
     }
 
     fn table(&mut self, transfer: &Arc<Transfer>, range: [f64; 2]) -> usize {
@@ -240,6 +257,15 @@ impl Gathered {
                 let step = texture.texture_from_voxel.matrix()[(axis, axis)];
                 [g.x as f32, g.y as f32, g.z as f32, step as f32]
             };
+            let mut channel = [0.0; 4];
+            let mut stack = [0.0; 4];
+            match texture.reading {
+                Reading::Scalar { channel: which } => channel[which] = 1.0,
+                Reading::Stacked { slices } => {
+                    stack = [slices as f32, texture.summary.extent[2] as f32, 0.0, 0.0];
+                }
+                Reading::Colour => {}
+            }
             fragments.push(gpu_data::Fragment {
                 u: row(0),
                 v: row(1),
@@ -255,6 +281,8 @@ impl Gathered {
                 plane_end: planes.len() as u32,
                 cylinder_first,
                 cylinder_end: cylinders.len() as u32,
+                channel,
+                stack,
             });
         }
         debug_assert_eq!(self.tables.len(), self.known_tables.len() * ROWS * NODES, "whole tables");

@@ -42,4 +42,4 @@ mod transfer;
 mod view;
 pub mod volume;
 
-pub use texture::TextureSummary;
+pub use texture::{GridSource, SourceError, StepDecoder, Stored, TextureSummary, decode_on_device};

@@ -11,8 +11,9 @@ use crate::passes::slabs::{Inputs, SLOTS, Slabs, Spacing, Stack, upload};
 use crate::passes::surfaces::{LAYER_BYTES, Surfaces};
 use crate::scene::Scene;
 use crate::target::{Target, buffer_entry};
-use crate::texture::{TextureCache, TextureSummary};
+use crate::texture::{StepDecoder, TextureCache, TextureSummary, VolumeTexture};
 use crate::view::{View, gpu_data};
+use crate::volume::PackedStep;
 
 /// How fine the sub-steps along a ray are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,6 +81,8 @@ pub struct Stats {
     pub layers: u64,
     /// Bands that the picture was drawn in.
     pub bands: u32,
+    /// Textures made and sent for this frame; the others were there.
+    pub textures_sent: u64,
     /// Textures, one an entry.
     pub textures: Vec<TextureSummary>,
     /// What was replaced or reduced, in sentences.
@@ -96,6 +99,8 @@ pub struct Renderer {
     present: Present,
     textures: TextureCache,
     bricks: BrickCache,
+    /// The step last sent ahead of its picture.
+    sent: Option<Arc<VolumeTexture>>,
     target: Option<Target>,
 }
 
@@ -120,6 +125,7 @@ impl Renderer {
             present,
             textures: TextureCache::default(),
             bricks: BrickCache::default(),
+            sent: None,
             target: None,
         })
     }
@@ -127,6 +133,34 @@ impl Renderer {
     /// The device.
     pub fn gpu(&self) -> &Arc<Gpu> {
         &self.gpu
+    }
+
+    /// What decodes the steps of time series from now on; [`StepDecoder::Auto`] at first.
+    pub fn set_step_decoder(&mut self, decoder: StepDecoder) {
+        self.textures.set_decoder(decoder);
+    }
+
+    /// Sends a step of a time series to the device before it is drawn, and keeps it for the next picture in place of
+    /// the one sent before. The device may still be at work on return: see [`Renderer::finish`].
+    ///
+    /// # Errors
+    /// [`GpuError`]: memory, a lost device, bytes that do not decode.
+    pub fn send_step(&mut self, step: &PackedStep) -> Result<(), GpuError> {
+        let gpu = Arc::clone(&self.gpu);
+        self.sent = None;
+        self.textures.forget_unused();
+        self.sent = Some(self.textures.step(&gpu, step)?);
+        // Work begins without waiting for a picture.
+        gpu.queue.submit([]);
+        Ok(())
+    }
+
+    /// Waits until the device has done all that was sent.
+    ///
+    /// # Errors
+    /// [`GpuError`]: what the device reports, or that it is lost.
+    pub fn finish(&mut self) -> Result<(), GpuError> {
+        self.gpu.wait()
     }
 
     /// The picture last drawn over its background, display RGBA; `None` before the first.
@@ -293,6 +327,7 @@ impl Renderer {
             fragments_skipped: fragments_empty,
             bricks,
             bricks_skipped: bricks - bricks_occupied,
+            textures_sent: gathered.textures_sent,
             textures: gathered.textures.iter().map(|t| t.summary.clone()).collect(),
             notes,
             ..Stats::default()

@@ -1,10 +1,11 @@
 //! What to draw, as plain data. No GPU, no files: the renderer and the `f64` reference both read it.
 
+use std::fmt;
 use std::sync::Arc;
 
 use thiserror::Error;
 
-use crate::volume::{Affine, Cutter, Grid, Point, Side, Transfer, TriangleMesh, Vector};
+use crate::volume::{Affine, Cutter, Grid, PackedStep, Point, Side, Transfer, TriangleMesh, Vector};
 
 /// How a surface or a volume is lit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -51,6 +52,27 @@ pub enum TextureFormat {
     Bc7,
 }
 
+impl TextureFormat {
+    /// Its name in a case file: `"r16"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::R16 => "r16",
+            Self::R32f => "r32f",
+            Self::Bc4 => "bc4",
+            Self::Rgba8 => "rgba8",
+            Self::Bc3 => "bc3",
+            Self::Bc7 => "bc7",
+        }
+    }
+}
+
+impl fmt::Display for TextureFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
 /// One piece of a volume: what all of `keep` keeps, moved by `pose`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Piece {
@@ -72,6 +94,9 @@ impl Piece {
 pub struct VolumeItem {
     /// Its samples.
     pub grid: Arc<Grid>,
+    /// The same samples as the compressed step of a time series. Where given, the renderer makes its texture of
+    /// this and `texture` is not asked; the reference and the sections read the grid.
+    pub packed: Option<Arc<PackedStep>>,
     /// `world_from_patient`: where the whole volume is placed, after the grid's own `world_from_voxel`.
     pub pose: Affine,
     /// Colour and opacity.

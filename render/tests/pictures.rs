@@ -1,6 +1,6 @@
 //! The GPU's picture against the `f64` reference, for every pairing of volumes, cuts, surfaces and cameras.
 
-use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
 use render::gpu::{Gpu, GpuError};
 use render::image::FloatImage;
@@ -10,6 +10,7 @@ use render::scene::{Camera, MeshItem, Piece, Projection, Scene, Shading, Texture
 use render::volume::{
     Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Side, Transfer, TriangleMesh, Vector, synth,
 };
+use render::{StepDecoder, Stored};
 
 const SIZE: [u32; 2] = [96, 80];
 
@@ -22,21 +23,56 @@ fn draw(scene: &Scene, quality: Quality) -> Option<(FloatImage, Stats)> {
 }
 
 fn draw_sized(scene: &Scene, size: [u32; 2], quality: Quality) -> Option<(FloatImage, Stats)> {
-    if std::env::var_os("NO_GPU").is_some_and(|v| v == "1") {
+    if !has_gpu() {
         return None;
     }
-    let mut renderer =
-        RENDERER.as_ref().map_err(Clone::clone).unwrap().lock().unwrap_or_else(PoisonError::into_inner);
+    let mut renderer = renderer();
     let stats = renderer.render(scene, size, quality).unwrap();
     Some((renderer.read().unwrap(), stats))
 }
 
-fn truth(scene: &Scene) -> FloatImage {
+fn renderer() -> MutexGuard<'static, Renderer> {
+    RENDERER.as_ref().map_err(Clone::clone).unwrap().lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The device, unless `NO_GPU=1` says there is none.
+pub(crate) fn device() -> Option<Arc<Gpu>> {
+    has_gpu().then(|| Arc::clone(renderer().gpu()))
+}
+
+fn has_gpu() -> bool {
+    std::env::var_os("NO_GPU").is_none_or(|v| v != "1")
+}
+
+/// Draws scenes one after the other with nothing between them, steps decoded by `decoder`.
+pub(crate) fn draw_in_turn(scenes: &[Scene], decoder: StepDecoder) -> Vec<(FloatImage, Stats)> {
+    if !has_gpu() {
+        return Vec::new();
+    }
+    let mut renderer = renderer();
+    renderer.set_step_decoder(decoder);
+    let drawn = scenes
+        .iter()
+        .map(|scene| {
+            let stats = renderer.render(scene, SIZE, Quality::Finest).unwrap();
+            (renderer.read().unwrap(), stats)
+        })
+        .collect();
+    renderer.set_step_decoder(StepDecoder::Auto);
+    drawn
+}
+
+/// One volume in the usual view.
+pub(crate) fn perspective_scene(volume: VolumeItem) -> Scene {
+    scene(vec![volume], vec![])
+}
+
+pub(crate) fn truth(scene: &Scene) -> FloatImage {
     reference::draw(scene, SIZE, &reference::Options::default(), &|_, _| true).unwrap()
 }
 
 /// Draws with both and holds the difference under bounds; returns what the GPU did.
-fn agrees(scene: &Scene, what: &str, psnr_db: f64, max: f64) -> Stats {
+pub(crate) fn agrees(scene: &Scene, what: &str, psnr_db: f64, max: f64) -> Stats {
     let truth = truth(scene);
     let Some((picture, stats)) = draw(scene, Quality::Finest) else { return Stats::default() };
     let d = picture.difference(&truth, scene.background).unwrap();
@@ -77,8 +113,9 @@ fn grid() -> Arc<Grid> {
     Arc::new(Grid::new([48, 40, 32], Samples::I16(whole), Rescale::default(), place).unwrap())
 }
 
-fn volume(texture: TextureFormat) -> VolumeItem {
+pub(crate) fn volume(texture: TextureFormat) -> VolumeItem {
     VolumeItem {
+        packed: None,
         grid: grid(),
         pose: Affine::identity(),
         transfer: bone(),
@@ -286,7 +323,7 @@ fn lossy_textures_state_their_error_and_stay_near() {
         let s = scene(vec![volume(format)], vec![]);
         let stats = agrees(&s, "lossy texture", psnr_db, 128.0);
         for t in &stats.textures {
-            assert_eq!(t.format, format, "no fall-back is needed here");
+            assert_eq!(t.stored, Stored::Grid(format), "no fall-back is needed here");
             assert!(t.max_error > 0.0 && t.psnr_db.is_finite(), "the error is stated: {t:?}");
         }
     }

@@ -10,11 +10,12 @@ use thiserror::Error;
 use super::{Case, Implant, Source, Volume};
 use crate::load::{self, Content, Item, Limits, LoadError, Note, Progress};
 use crate::sample;
+use crate::steps::{self, SeriesFileError, Steps};
 
 /// What kind of data is wanted of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
-    /// A [`Grid`].
+    /// A [`Grid`], or [`Steps`] of them.
     Volume,
     /// A [`TriangleMesh`].
     Surface,
@@ -49,8 +50,21 @@ impl Key {
 pub enum Data {
     /// A volume.
     Grid(Arc<Grid>),
+    /// A volume over time.
+    Steps(Arc<Steps>),
     /// A surface.
     Mesh(Arc<TriangleMesh>),
+}
+
+impl Data {
+    /// Least and greatest value of a volume, over all its steps; none of a surface.
+    pub fn range(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Grid(grid) => Some(grid.range()),
+            Self::Steps(steps) => Some(steps.range()),
+            Self::Mesh(_) => None,
+        }
+    }
 }
 
 /// Data with what is known about them.
@@ -77,6 +91,9 @@ pub enum AssetError {
     /// The loader's complaint.
     #[error(transparent)]
     Load(#[from] LoadError),
+    /// The series file's complaint.
+    #[error(transparent)]
+    Series(#[from] SeriesFileError),
     /// The source has no such item.
     #[error("holds {found} {kind}, so item {item} is not there; choose another file or item: {}", path.display())]
     NoItem {
@@ -90,7 +107,7 @@ pub enum AssetError {
         path: PathBuf,
     },
     /// No built-in data of that name.
-    #[error("there are no built-in data \"{name}\"; use builtin:hip/ct, builtin:hip/mri or builtin:hip/stem")]
+    #[error("there are no built-in data \"{name}\"; use builtin:hip/ct, builtin:hip/mri, builtin:hip/stem or builtin:beat")]
     NoBuiltin {
         /// As asked for.
         name: String,
@@ -107,11 +124,20 @@ pub struct Assets {
 }
 
 impl Assets {
-    /// The samples of a volume, where loaded.
-    pub fn grid(&self, volume: &Volume) -> Option<&Arc<Grid>> {
+    /// The samples of a volume, where loaded; of one over time, those of the step that it shows.
+    pub fn grid(&self, volume: &Volume) -> Option<Arc<Grid>> {
         match &self.loaded.get(&Key::of_volume(volume))?.data {
-            Data::Grid(grid) => Some(grid),
+            Data::Grid(grid) => Some(Arc::clone(grid)),
+            Data::Steps(steps) => steps.grid(volume.step),
             Data::Mesh(_) => None,
+        }
+    }
+
+    /// The steps of a volume over time, where loaded; none of a volume that does not change.
+    pub fn steps(&self, volume: &Volume) -> Option<&Arc<Steps>> {
+        match &self.loaded.get(&Key::of_volume(volume))?.data {
+            Data::Steps(steps) => Some(steps),
+            Data::Grid(_) | Data::Mesh(_) => None,
         }
     }
 
@@ -119,7 +145,7 @@ impl Assets {
     pub fn mesh(&self, implant: &Implant) -> Option<&Arc<TriangleMesh>> {
         match &self.loaded.get(&Key::of_implant(implant))?.data {
             Data::Mesh(mesh) => Some(mesh),
-            Data::Grid(_) => None,
+            Data::Grid(_) | Data::Steps(_) => None,
         }
     }
 
@@ -209,15 +235,25 @@ pub fn open(
     progress: &dyn Progress,
 ) -> Result<Vec<Arc<Asset>>, AssetError> {
     match source {
+        Source::Path(path) if steps::is_series(path) => {
+            let steps = Steps::open(path, limits.decoded_bytes)?;
+            let (name, kind) = steps.title().unwrap_or_default();
+            let name = if name.is_empty() { source.short_name() } else { name.to_owned() };
+            let modality = Some(kind.to_owned()).filter(|kind| !kind.is_empty());
+            let key = Key { source: source.clone(), kind: Kind::Volume, item: 0 };
+            let data = Data::Steps(Arc::new(steps));
+            Ok(vec![Arc::new(Asset { key, name, format: "series", modality, data, notes: Vec::new() })])
+        }
         Source::Path(path) => Ok(number(source, load::open(path, limits, progress)?)),
         Source::Builtin(name) => {
             let (data, modality) = match name.as_str() {
                 "hip/ct" => (Data::Grid(sample::ct()?), Some("CT")),
                 "hip/mri" => (Data::Grid(sample::mri()?), Some("MR")),
                 "hip/stem" => (Data::Mesh(sample::stem()?), None),
+                sample::BEAT => (Data::Steps(Arc::new(Steps::in_memory(sample::beat()?))), None),
                 _ => return Err(AssetError::NoBuiltin { name: name.clone() }),
             };
-            let kind = if matches!(data, Data::Grid(_)) { Kind::Volume } else { Kind::Surface };
+            let kind = if matches!(data, Data::Mesh(_)) { Kind::Surface } else { Kind::Volume };
             let key = Key { source: source.clone(), kind, item: 0 };
             let modality = modality.map(str::to_owned);
             let name = source.short_name();
@@ -232,10 +268,8 @@ fn number(source: &Source, items: Vec<Item>) -> Vec<Arc<Asset>> {
     for item in items {
         let (data, kind, count) = match item.content {
             Content::Volume(grid) => (Data::Grid(Arc::new(grid)), Kind::Volume, &mut volumes),
-            // A case shows one moment; a series counts as the volume of its first step.
             Content::Series(series) => {
-                let Some(first) = series.steps().first() else { continue };
-                (Data::Grid(Arc::clone(first)), Kind::Volume, &mut volumes)
+                (Data::Steps(Arc::new(Steps::in_memory(series))), Kind::Volume, &mut volumes)
             }
             Content::Mesh(mesh) => (Data::Mesh(Arc::new(mesh)), Kind::Surface, &mut surfaces),
             Content::Cells(_) => continue,

@@ -19,6 +19,13 @@ pub enum Edit {
     SetBackground([f64; 3]),
     /// The view; none fits everything. Not undone: see [`super::History`].
     SetCamera(Option<Camera>),
+    /// The step that a volume over time shows. Not undone: see [`super::History`].
+    SetStep {
+        /// The volume.
+        id: String,
+        /// From 0.
+        step: usize,
+    },
     /// A new volume at the end of the list.
     AddVolume(Box<Volume>),
     /// Takes a volume away. Refused while fragments are of it.
@@ -293,6 +300,7 @@ pub fn apply(case: &mut Case, edit: Edit) -> Result<(), EditError> {
             }
             case.camera = camera;
         }
+        Edit::SetStep { id, step } => volume_mut(case, &id)?.step = step,
         Edit::AddVolume(volume) => {
             new_id("volume", &volume.id, case.volume(&volume.id).is_some())?;
             rigid(&volume.id, volume.pose)?;

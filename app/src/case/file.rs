@@ -177,10 +177,5 @@ fn folder_of(path: &Path) -> PathBuf {
     path.parent().map_or_else(|| PathBuf::from("."), Path::to_owned)
 }
 
-/// The name that a case file has for a texture format: `"bc4"`.
-pub fn texture_name(texture: render::scene::TextureFormat) -> &'static str {
-    write::texture_name(texture)
-}
-
 #[cfg(test)]
 mod tests;

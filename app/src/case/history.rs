@@ -4,7 +4,8 @@
 //! becomes a step when it has rested [`REST_SECS`], or after [`LONGEST_SECS`] at the latest. Changes
 //! that are not of one drag (see [`Edit::continues`]) never join.
 //!
-//! The view is not a step: looking around does not fill the list, and undo does not turn the picture.
+//! The view and the time shown are no steps: looking around and playing do not fill the list, and undo does not
+//! turn the picture or the clock.
 
 use std::collections::VecDeque;
 
@@ -52,7 +53,7 @@ impl History {
     /// # Errors
     /// [`EditError`]; the case and its past are as they were.
     pub fn edit(&mut self, edit: Edit, now_secs: f64) -> Result<(), EditError> {
-        if matches!(edit, Edit::SetCamera(_)) {
+        if matches!(edit, Edit::SetCamera(_) | Edit::SetStep { .. }) {
             return apply(&mut self.case, edit);
         }
         let mut changed = self.case.clone();
@@ -109,7 +110,7 @@ impl History {
     /// Replaces the case but keeps the view; the case as it was.
     fn go_to(&mut self, mut case: Case) -> Case {
         self.drag = None;
-        case.camera = self.case.camera;
+        keep_view(&mut case, &self.case);
         std::mem::replace(&mut self.case, case)
     }
 
@@ -131,8 +132,18 @@ impl History {
     /// Whether the case is as it was saved, the view aside.
     pub fn is_saved(&self) -> bool {
         let mut saved = self.saved.clone();
-        saved.camera = self.case.camera;
+        keep_view(&mut saved, &self.case);
         saved == self.case
+    }
+}
+
+/// Gives a case the camera and the steps shown of another.
+fn keep_view(case: &mut Case, shown: &Case) {
+    case.camera = shown.camera;
+    for volume in &mut case.volumes {
+        if let Some(now) = shown.volume(&volume.id) {
+            volume.step = now.step;
+        }
     }
 }
 
@@ -221,5 +232,18 @@ mod tests {
         let mut history = History::new(Case::default());
         let refused = history.edit(Edit::RemoveCutter { id: "c".to_owned() }, 0.0);
         assert!(refused.is_err() && !history.can_undo(), "nothing happened");
+    }
+
+    #[test]
+    fn the_step_shown_is_no_change_of_the_plan_and_undo_does_not_turn_it_back() {
+        let transfer = crate::presets::default_for(None, [0.0, 1.0]);
+        let source = crate::case::Source::Builtin("hip/ct".to_owned());
+        let volume = crate::case::Volume::new("beat", source, std::sync::Arc::new(transfer));
+        let mut history = History::new(Case { volumes: vec![volume], ..Case::default() });
+        named(&mut history, "a", 0.0);
+        history.edit(Edit::SetStep { id: "beat".to_owned(), step: 7 }, 1.0).expect("a step");
+        assert!(history.undo() && !history.can_undo(), "only the name was a change");
+        assert!(history.is_saved(), "playing is nothing to save");
+        assert_eq!(history.case().volumes[0].step, 7, "the clock stays");
     }
 }

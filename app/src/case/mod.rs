@@ -80,6 +80,8 @@ pub struct Volume {
     pub source: Source,
     /// Which of the source's volumes, from 0.
     pub item: usize,
+    /// Of a volume over time: the step shown, from 0. One past the end shows the last.
+    pub step: usize,
     /// `world_from_patient`, rigid: where the volume is placed after its own `world_from_voxel`.
     pub pose: Affine,
     /// Whether it is drawn.
@@ -103,6 +105,7 @@ impl Volume {
             id: id.into(),
             source,
             item: 0,
+            step: 0,
             pose: Affine::identity(),
             visible: true,
             texture: TextureFormat::Auto,

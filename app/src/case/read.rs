@@ -138,6 +138,7 @@ fn volume(value: Value, at: String, folder: &Path) -> Read<Volume> {
     let (value, at) = fields.need("source")?;
     let source = source(value, at, folder)?;
     let item = fields.or("item", 0, whole)?;
+    let step = fields.or("step", 0, whole)?;
     let pose = fields.or("pose", Affine::identity(), pose)?;
     let visible = fields.or("visible", true, boolean)?;
     let texture = fields.or("texture", TextureFormat::Auto, texture)?;
@@ -149,6 +150,7 @@ fn volume(value: Value, at: String, folder: &Path) -> Read<Volume> {
         id,
         source,
         item,
+        step,
         pose,
         visible,
         texture,
@@ -355,21 +357,20 @@ fn pose(value: Value, at: String) -> Read<Affine> {
     })
 }
 
-/// The names of texture formats in a file.
-pub(super) const TEXTURES: [(&str, TextureFormat); 7] = [
-    ("auto", TextureFormat::Auto),
-    ("r16", TextureFormat::R16),
-    ("r32f", TextureFormat::R32f),
-    ("bc4", TextureFormat::Bc4),
-    ("rgba8", TextureFormat::Rgba8),
-    ("bc3", TextureFormat::Bc3),
-    ("bc7", TextureFormat::Bc7),
+const TEXTURES: [TextureFormat; 7] = [
+    TextureFormat::Auto,
+    TextureFormat::R16,
+    TextureFormat::R32f,
+    TextureFormat::Bc4,
+    TextureFormat::Rgba8,
+    TextureFormat::Bc3,
+    TextureFormat::Bc7,
 ];
 
 fn texture(value: Value, at: String) -> Read<TextureFormat> {
     let text = string(value, at.clone())?;
-    match TEXTURES.iter().find(|(name, _)| *name == text) {
-        Some((_, format)) => Ok(*format),
+    match TEXTURES.into_iter().find(|format| format.name() == text) {
+        Some(format) => Ok(format),
         None => fault(
             at,
             format!("\"{text}\" is not a texture format"),

@@ -3,11 +3,10 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use render::scene::{Projection, Shading, TextureFormat};
+use render::scene::{Projection, Shading};
 use render::volume::{Cutter, Side};
 use serde_json::{Map, Value, json};
 
-use super::read::TEXTURES;
 use super::{Case, Fragment, Implant, NamedCutter, Other, Source, Volume};
 
 /// A source whose path is not Unicode, which JSON cannot hold.
@@ -67,9 +66,12 @@ fn volume(v: &Volume, folder: &Path) -> Result<Value, NotUnicode> {
     if v.item > 0 {
         put(&mut map, "item", json!(v.item));
     }
+    if v.step > 0 {
+        put(&mut map, "step", json!(v.step));
+    }
     put(&mut map, "pose", json!(v.pose.to_row_major()));
     put(&mut map, "visible", json!(v.visible));
-    put(&mut map, "texture", json!(texture_name(v.texture)));
+    put(&mut map, "texture", json!(v.texture.name()));
     let point = |p: &render::volume::ControlPoint| {
         let [r, g, b, a] = p.rgba;
         json!([p.value, r, g, b, a])
@@ -83,10 +85,6 @@ fn volume(v: &Volume, folder: &Path) -> Result<Value, NotUnicode> {
 }
 
 /// The name a file has for a texture format.
-pub(super) fn texture_name(texture: TextureFormat) -> &'static str {
-    TEXTURES.iter().find(|(_, format)| *format == texture).map_or("auto", |(name, _)| name)
-}
-
 fn shading_name(shading: Shading, lit: &'static str) -> &'static str {
     match shading {
         Shading::None => "none",

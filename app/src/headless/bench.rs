@@ -1,4 +1,5 @@
-//! `bench`: run time beside error. `frame` draws, `compress` makes textures.
+//! `bench`: run time beside error. `frame` draws, `compress` makes textures, `series` and `play` are of volumes over
+//! time.
 //!
 //! Each result is one JSON object a line (`--json`) or a line of a table. Times are the median of
 //! `REPEATS` runs after one that is not counted, so that neither the first upload nor one busy moment
@@ -8,6 +9,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use ::compress::bc::Level;
+use ::render::GridSource;
 use ::render::gpu::Gpu;
 use ::render::reference;
 use ::render::renderer::{Quality, Renderer};
@@ -16,11 +19,11 @@ use serde_json::{Map, Value, json};
 
 use super::input::Input;
 use super::plot::{Chart, Series};
-use super::render::format_name;
 use super::{Failure, Terminal, compress, input, say, write_file};
+use crate::case::Source;
 use crate::cli::{BenchArgs, BenchName, Format};
 use crate::load::Progress as _;
-use crate::scene;
+use crate::{sample, scene};
 
 /// Counted runs of each measurement.
 const REPEATS: usize = 3;
@@ -34,48 +37,85 @@ const SPACINGS: [f64; 2] = [1.0, 0.5];
 const TEXTURES: [TextureFormat; 4] =
     [TextureFormat::R16, TextureFormat::Bc4, TextureFormat::Rgba8, TextureFormat::Bc3];
 /// Formats of `compress`, each with the uncompressed one that it stands beside.
-const FORMATS: [(Format, Format); 3] =
-    [(Format::Bc4, Format::R8), (Format::Bc3, Format::Rgba8), (Format::Bc1, Format::Rgba8)];
+const FORMATS: [(Format, Format); 4] = [
+    (Format::Bc4, Format::R8),
+    (Format::Bc3, Format::Rgba8),
+    (Format::Bc1, Format::Rgba8),
+    (Format::Bc7, Format::Rgba8),
+];
+/// Turns of `compress`: a texture takes milliseconds.
+const TURNS: usize = 15;
 
 /// Runs a benchmark.
 ///
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &BenchArgs) -> Result<(), Failure> {
+    let moves = matches!(args.name, BenchName::Series | BenchName::Play);
     let input = match &args.data {
         Some(path) => input::open(path)?,
+        None if moves => input::of_source(Source::Builtin(sample::BEAT.to_owned()))?,
         None => input::builtin()?,
     };
-    let (rows, chart) = match args.name {
-        BenchName::Frame => frame(&input, args)?,
-        BenchName::Compress => textures(&input, args)?,
+    let path = args.data.as_deref().unwrap_or(Path::new("the built-in data"));
+    let mut bench = Bench { json: args.json, enlarge: usize::from(args.enlarge), rows: Vec::new() };
+    let (name, chart): (_, fn(&[Row]) -> Chart) = match args.name {
+        BenchName::Frame => {
+            frame(&input, &mut bench)?;
+            ("frame.svg", frame_chart)
+        }
+        BenchName::Compress => {
+            textures(&input, path, &mut bench)?;
+            ("compress.svg", compress_chart)
+        }
+        BenchName::Series => {
+            super::series::bench(&input, path, &mut bench)?;
+            ("series.svg", series_chart)
+        }
+        BenchName::Play => {
+            super::play::bench(&input, path, &mut bench)?;
+            ("play.svg", play_chart)
+        }
     };
     if let Some(folder) = &args.plot {
         std::fs::create_dir_all(folder).map_err(|source| Failure::Output { path: folder.clone(), source })?;
-        let name = if args.name == BenchName::Frame { "frame.svg" } else { "compress.svg" };
-        write_file(&folder.join(name), chart(&rows).svg().as_bytes())?;
+        write_file(&folder.join(name), chart(&bench.rows).svg().as_bytes())?;
     }
     Ok(())
 }
 
 /// What was measured of one thing.
 type Row = Map<String, Value>;
-type Measured = (Vec<Row>, fn(&[Row]) -> Chart);
 
-/// Prints a row as soon as it is measured, and keeps it.
-fn report(rows: &mut Vec<Row>, row: Value, json: bool) -> Result<(), Failure> {
-    let Value::Object(row) = row else { return Ok(()) };
-    if json {
-        say(&Value::Object(row.clone()).to_string())?;
-    } else {
-        let cell = |(key, value): (&String, &Value)| match value.as_f64() {
-            Some(number) if value.is_f64() => format!("{key} {number:.2}"),
-            _ => format!("{key} {}", value.as_str().map_or_else(|| value.to_string(), str::to_owned)),
-        };
-        say(&row.iter().map(cell).collect::<Vec<_>>().join("  "))?;
+/// How a benchmark is run and what it found.
+#[derive(Debug)]
+pub(super) struct Bench {
+    json: bool,
+    enlarge: usize,
+    rows: Vec<Row>,
+}
+
+impl Bench {
+    /// Voxels along each axis for one of the data's.
+    pub(super) fn enlarge(&self) -> usize {
+        self.enlarge
     }
-    rows.push(row);
-    Ok(())
+
+    /// Prints a row as soon as it is measured, and keeps it.
+    pub(super) fn report(&mut self, row: Value) -> Result<(), Failure> {
+        let Value::Object(row) = row else { return Ok(()) };
+        if self.json {
+            say(&Value::Object(row.clone()).to_string())?;
+        } else {
+            let cell = |(key, value): (&String, &Value)| match value.as_f64() {
+                Some(number) if value.is_f64() => format!("{key} {number:.2}"),
+                _ => format!("{key} {}", value.as_str().map_or_else(|| value.to_string(), str::to_owned)),
+            };
+            say(&row.iter().map(cell).collect::<Vec<_>>().join("  "))?;
+        }
+        self.rows.push(row);
+        Ok(())
+    }
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -83,7 +123,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-fn frame(input: &Input, args: &BenchArgs) -> Result<Measured, Failure> {
+fn frame(input: &Input, bench: &mut Bench) -> Result<(), Failure> {
     let mut scene = scene::scene(&input.case, &input.assets);
     // Colours classified beforehand have no gradient to be lit by: without light all textures compare.
     for volume in &mut scene.volumes {
@@ -93,7 +133,6 @@ fn frame(input: &Input, args: &BenchArgs) -> Result<Measured, Failure> {
     let terminal = Terminal::default();
     let progress = |done: usize, total: usize| terminal.step("drawing the reference", done, total);
     let truth = reference::draw(&scene, SIZE, &reference::Options::default(), &progress)?;
-    let mut rows = Vec::new();
     for texture in TEXTURES {
         for volume in &mut scene.volumes {
             volume.texture = texture;
@@ -114,18 +153,18 @@ fn frame(input: &Input, args: &BenchArgs) -> Result<Measured, Failure> {
             let bytes: u64 = stats.textures.iter().map(|t| t.bytes).sum();
             let largest = stats.textures.iter().map(|t| t.max_error).fold(0.0, f64::max);
             // What the adapter lacks is replaced: the row names what was drawn.
-            let drawn: Vec<&str> = stats.textures.iter().map(|t| format_name(t.format)).collect();
-            let replaced = drawn.iter().any(|name| *name != format_name(texture));
+            let drawn: Vec<String> = stats.textures.iter().map(|t| t.stored.to_string()).collect();
+            let replaced = drawn.iter().any(|name| name != texture.name());
             let row = json!({
-                "bench": "frame", "adapter": gpu.adapter(), "texture": format_name(texture),
+                "bench": "frame", "adapter": gpu.adapter(), "texture": texture.name(),
                 "drawn_as_asked": !replaced, "size": SIZE, "shading": "none", "spacing_voxels": spacing, "step_mm": stats.step_mm,
                 "runs": times.len(), "frame_ms": median(times), "generate_ms": generate_ms, "texture_bytes": bytes,
                 "texture_max_error": largest, "psnr_db": apart.psnr_db, "max_error_255": apart.max,
             });
-            report(&mut rows, row, args.json)?;
+            bench.report(row)?;
         }
     }
-    Ok((rows, frame_chart))
+    Ok(())
 }
 
 /// Time to make all textures of a scene anew; ms, the median of some renderers that know none yet.
@@ -151,40 +190,45 @@ fn frame_chart(rows: &[Row]) -> Chart {
     }
 }
 
-fn textures(input: &Input, args: &BenchArgs) -> Result<Measured, Failure> {
-    let path = args.data.as_deref().unwrap_or(Path::new("the built-in case"));
+fn textures(input: &Input, path: &Path, bench: &mut Bench) -> Result<(), Failure> {
     let (volume, grid) = compress::volume(&input.case, &input.assets, path)?;
-    let extent = compress::extent(grid)?;
-    let mut rows = Vec::new();
+    let source = GridSource::new(&grid)?;
+    let textures = compress::Textures::new(&source, &grid, &volume.transfer)?;
     for threads in thread_counts() {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| {
-            Failure::Other(format!("the threads cannot be started ({e}); close other programs"))
-        })?;
+        let pool = compress::pool(threads)?;
         for (format, plain) in FORMATS {
-            let make = |format| pool.install(|| compress::make(format, grid, &volume.transfer, extent));
-            let mut made = make(format)?;
-            let (mut generate, mut encode, mut uncompressed) = (Vec::new(), Vec::new(), Vec::new());
-            for _ in 0..REPEATS {
-                uncompressed.push(make(plain)?.generate_ms);
-                made = make(format)?;
-                generate.push(made.generate_ms);
-                encode.push(made.encode_ms);
+            let levels: &[Level] = if format == Format::Bc4 { &[Level::Best] } else { &[Level::Fast, Level::Best] };
+            for &level in levels {
+                let make = |format, out: &mut Vec<u8>| -> Result<f64, Failure> {
+                    let begin = Instant::now();
+                    pool.install(|| textures.make(format, level, out))?;
+                    Ok(begin.elapsed().as_secs_f64() * 1e3)
+                };
+                let (mut blocks, mut texels) = (Vec::new(), Vec::new());
+                let (mut block_ms, mut texel_ms) = (f64::INFINITY, f64::INFINITY);
+                // Turn by turn, the shortest of each: other work on the machine then meets both alike.
+                for _ in 0..TURNS {
+                    texel_ms = texel_ms.min(make(plain, &mut texels)?);
+                    block_ms = block_ms.min(make(format, &mut blocks)?);
+                }
+                let lost = pool.install(|| textures.lost(format, &blocks))?;
+                let stats = pool.install(|| textures.stats(format, level, &mut blocks))?;
+                let name = if level == Level::Fast { "fast" } else { "best" };
+                bench.report(json!({
+                    "bench": "compress", "format": format.name(), "level": name, "preset": volume.id,
+                    "extent": grid.extent(), "threads": threads,
+                    "texture_ms": block_ms, "uncompressed": plain.name(), "uncompressed_ms": texel_ms,
+                    "time_to_uncompressed": block_ms / texel_ms,
+                    "mvoxel_per_s": grid.samples().len() as f64 / 1e3 / block_ms,
+                    "texture_bytes": blocks.len(), "ratio_to_uncompressed": texels.len() as f64 / blocks.len() as f64,
+                    "psnr_db": lost.psnr_db, "largest": lost.largest, "largest_unit": lost.unit,
+                    "blocks": stats.blocks, "blocks_clear": stats.clear, "blocks_solid": stats.solid,
+                    "blocks_curve": stats.curve,
+                }))?;
             }
-            let (generate, encode) = (median(generate), median(encode));
-            let texels = extent.voxels() * if format.is_colour() { 4 } else { 1 };
-            let quality = made.quality.as_ref();
-            let row = json!({
-                "bench": "compress", "format": format.name(), "extent": extent.sizes(), "threads": threads,
-                "texture_ms": generate + encode, "encode_ms": encode,
-                "uncompressed": plain.name(), "uncompressed_ms": median(uncompressed),
-                "encode_mb_per_s": texels as f64 / 1e3 / encode.max(1e-6),
-                "texture_bytes": made.data.len(), "ratio_to_uncompressed": texels as f64 / made.data.len() as f64,
-                "psnr_db": quality.map(|q| q.psnr_db), "max_error_255": quality.map(|q| q.largest),
-            });
-            report(&mut rows, row, args.json)?;
         }
     }
-    Ok((rows, compress_chart))
+    Ok(())
 }
 
 /// One thread and all of them.
@@ -194,12 +238,36 @@ fn thread_counts() -> Vec<usize> {
 }
 
 fn compress_chart(rows: &[Row]) -> Chart {
-    let label = |row: &Row| format!("{} threads", row["threads"]);
+    let label = |row: &Row| format!("{}, {} threads", row["level"], row["threads"]).replace('"', "");
     Chart {
         title: "Textures: time against error".to_owned(),
-        x: "encoding, ms".to_owned(),
-        y: "PSNR against the texels, dB".to_owned(),
-        series: series(rows, "format", &|row| (number(row, "encode_ms"), number(row, "psnr_db"), label(row))),
+        x: "from samples to blocks, ms".to_owned(),
+        y: "PSNR against the samples, dB".to_owned(),
+        series: series(rows, "format", &|row| (number(row, "texture_ms"), number(row, "psnr_db"), label(row))),
+    }
+}
+
+fn series_chart(rows: &[Row]) -> Chart {
+    let label = |row: &Row| format!("{} {}", row["encoder"], row["second"]).replace('"', "");
+    Chart {
+        title: "Codecs of a series: size against error".to_owned(),
+        x: "bytes for one of the samples'".to_owned(),
+        y: "PSNR, dB".to_owned(),
+        series: series(rows, "codec", &|row| {
+            (1.0 / number(row, "ratio"), number(row, "psnr_db"), label(row))
+        }),
+    }
+}
+
+fn play_chart(rows: &[Row]) -> Chart {
+    let label = |row: &Row| format!("{} to texture", row["second"]).replace('"', "");
+    Chart {
+        title: "Playing from a file that is in no cache: speed against error".to_owned(),
+        x: "volumes a second, from file to texture".to_owned(),
+        y: "PSNR, dB".to_owned(),
+        series: series(rows, "codec", &|row| {
+            (number(row, "volumes_per_s"), number(row, "psnr_db"), label(row))
+        }),
     }
 }
 

@@ -7,6 +7,7 @@ use super::{Failure, say, write_file};
 use crate::case::assets::{self, Data, Key};
 use crate::case::{Source, file};
 use crate::load::{Limits, Silent};
+use crate::save::series::{self, SeriesOptions};
 use crate::{sample, save};
 
 /// Writes `case.json` with its data beside it into a folder, which is made if it is not there.
@@ -56,6 +57,11 @@ fn write(key: &Key, folder: &Path) -> Result<PathBuf, Failure> {
             (path, bytes)
         }
         Data::Mesh(mesh) => (folder.join(format!("{name}.stl")), save::stl::stl(mesh)),
+        Data::Steps(steps) => {
+            let path = folder.join(format!("{name}.series"));
+            series::write(&path, steps, &name, "", SeriesOptions::default(), &Silent)?;
+            return Ok(path);
+        }
     };
     write_file(&path, &bytes)?;
     Ok(path)

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::{Failure, Terminal};
-use crate::case::assets::{self, Data};
+use crate::case::assets;
 use crate::case::{Assets, Case, Implant, Source, Volume, file};
 use crate::load::Limits;
 use crate::{presets, sample};
@@ -33,17 +33,25 @@ pub fn open(path: &Path) -> Result<Input, Failure> {
         let case = file::load(path).map_err(Failure::Case)?;
         return load(case);
     }
-    let source = Source::path(path);
+    let input = of_source(Source::path(path))?;
+    if input.case.volumes.is_empty() && input.case.implants.is_empty() {
+        let fault = "the data hold no volume and no surface; choose a file that does";
+        return Err(Failure::Unfit(format!("{fault}: {}", path.display())));
+    }
+    Ok(input)
+}
+
+/// The data of a source as a case of their own.
+///
+/// # Errors
+/// [`Failure`]: data that cannot be used.
+pub fn of_source(source: Source) -> Result<Input, Failure> {
     let found = assets::open(&source, &Limits::default(), &Terminal::default())?;
     let mut assets = Assets::default();
     let mut case = Case { name: source.short_name(), ..Case::default() };
     for asset in found {
         case_of(&mut case, &asset);
         assets.insert(asset);
-    }
-    if case.volumes.is_empty() && case.implants.is_empty() {
-        let fault = "the data hold no volume and no surface; choose a file that does";
-        return Err(Failure::Unfit(format!("{fault}: {}", path.display())));
     }
     // Several series of one folder lie over each other: the largest is shown.
     let size = |v: &Volume| assets.grid(v).map_or(0, |g| g.samples().len());
@@ -76,15 +84,15 @@ fn load(case: Case) -> Result<Input, Failure> {
 /// Adds data to a case as a volume or an implant of their own, with the defaults of their kind.
 fn case_of(case: &mut Case, asset: &assets::Asset) {
     let wish = asset.key.source.short_name();
-    match &asset.data {
-        Data::Grid(grid) => {
-            let transfer = presets::default_for(asset.modality.as_deref(), grid.range());
+    match asset.data.range() {
+        Some(range) => {
+            let transfer = presets::default_for(asset.modality.as_deref(), range);
             let id = case.free_volume_id(&wish);
             let mut volume = Volume::new(id, asset.key.source.clone(), Arc::new(transfer));
             volume.item = asset.key.item;
             case.volumes.push(volume);
         }
-        Data::Mesh(_) => {
+        None => {
             let mut implant = Implant::new(case.free_implant_id(&wish), asset.key.source.clone());
             implant.item = asset.key.item;
             case.implants.push(implant);

@@ -21,8 +21,10 @@ pub mod compress;
 pub mod demo;
 pub mod info;
 pub mod input;
+mod play;
 pub mod plot;
 pub mod render;
+mod series;
 
 /// Why a job was not done: one sentence, and the program's exit code.
 #[derive(Debug, Error)]

@@ -9,7 +9,7 @@ use ::render::gpu::Gpu;
 use ::render::image::FloatImage;
 use ::render::reference;
 use ::render::renderer::{Quality, Renderer, Stats};
-use ::render::scene::{Scene, TextureFormat};
+use ::render::scene::Scene;
 use serde_json::{Map, Value, json};
 
 use super::{Failure, Terminal, check_folder, input, say, write_file};
@@ -135,7 +135,7 @@ pub(super) fn figures(stats: &Stats, map: &mut Map<String, Value>) {
 /// One texture's figures. JSON has no infinity: a lossless texture's PSNR is `null`.
 fn texture(t: &TextureSummary) -> Value {
     json!({
-        "format": format_name(t.format),
+        "format": t.stored.to_string(),
         "extent": t.extent,
         "bytes": t.bytes,
         "ratio_to_r16": ratio(t),
@@ -144,11 +144,6 @@ fn texture(t: &TextureSummary) -> Value {
         "psnr_db": t.psnr_db,
         "generate_ms": t.generate_ms,
     })
-}
-
-/// The name that a case file has for a texture format.
-pub(super) fn format_name(format: TextureFormat) -> &'static str {
-    crate::case::file::texture_name(format)
 }
 
 /// Bytes of the same texels in 16 bits each, for one byte of this texture.
@@ -163,10 +158,8 @@ pub fn statement(textures: &[TextureSummary]) -> String {
     let lossy = textures.iter().filter(|t| t.max_error > 0.0);
     let parts: Vec<String> = lossy
         .map(|t| {
-            let scalar = matches!(t.format, TextureFormat::R16 | TextureFormat::R32f | TextureFormat::Bc4);
-            let unit = if scalar { "of the data's unit" } else { "of 255" };
-            let name = format_name(t.format);
-            format!("{name}, {:.1}:1 of 16 bits, largest error {:.3} {unit}", ratio(t), t.max_error)
+            let unit = if t.stored.is_colour() { "of 255" } else { "of the data's unit" };
+            format!("{}, {:.1}:1 of 16 bits, largest error {:.3} {unit}", t.stored, ratio(t), t.max_error)
         })
         .collect();
     if parts.is_empty() { String::new() } else { format!("lossy data: {}", parts.join("; ")) }
@@ -180,9 +173,12 @@ pub(super) fn ms(begin: Instant) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ::render::Stored;
+    use ::render::scene::TextureFormat;
 
     fn summary(format: TextureFormat, bytes: u64, max_error: f64) -> TextureSummary {
-        TextureSummary { format, extent: [8, 8, 8], bytes, max_error, psnr_db: 50.0, generate_ms: 1.0 }
+        let stored = Stored::Grid(format);
+        TextureSummary { stored, extent: [8, 8, 8], bytes, max_error, psnr_db: 50.0, generate_ms: 1.0 }
     }
 
     #[test]

@@ -110,6 +110,7 @@ mod tests {
         let grid = Grid::new([n; 3], Samples::U8(vec![9; n * n * n]), Rescale::default(), Affine::identity());
         let point = ControlPoint { value: 0.0, rgba: [1.0, 1.0, 1.0, 0.99999] };
         let item = VolumeItem {
+            packed: None,
             grid: Arc::new(grid.expect("grid")),
             pose: Affine::identity(),
             transfer: Arc::new(Transfer::new(vec![point], 1.0).expect("transfer")),

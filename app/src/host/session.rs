@@ -7,7 +7,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::case::assets::{self, Asset, Data, Key};
+use crate::case::assets::{self, Asset, Key};
 use crate::case::{Assets, Case, Edit, History, Implant, Source, Volume, file};
 use crate::jobs::{Job, Poll, Reporter, Step};
 use crate::load::{Limits, LoadError, Severity};
@@ -336,14 +336,14 @@ impl Session {
 fn added(case: &Case, asset: &Asset) -> Edit {
     let source = asset.key.source.clone();
     let wish = source.short_name();
-    match &asset.data {
-        Data::Grid(grid) => {
-            let transfer = presets::default_for(asset.modality.as_deref(), grid.range());
+    match asset.data.range() {
+        Some(range) => {
+            let transfer = presets::default_for(asset.modality.as_deref(), range);
             let mut volume = Volume::new(case.free_volume_id(&wish), source, Arc::new(transfer));
             volume.item = asset.key.item;
             Edit::AddVolume(Box::new(volume))
         }
-        Data::Mesh(_) => {
+        None => {
             let mut implant = Implant::new(case.free_implant_id(&wish), source);
             implant.item = asset.key.item;
             Edit::AddImplant(Box::new(implant))

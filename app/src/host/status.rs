@@ -1,8 +1,8 @@
 //! The line at the bottom: what draws, how, how fast, and what is being loaded.
 
 use egui::{ProgressBar, RichText, Ui};
+use render::TextureSummary;
 use render::renderer::Stats;
-use render::scene::TextureFormat;
 
 use crate::jobs::Step;
 use crate::ui::theme;
@@ -68,7 +68,7 @@ pub fn status_ui(ui: &mut Ui, status: &Status<'_>) -> bool {
 
 /// The formats in use and their memory: `"R16 + BC4, 34.5 MiB"`.
 fn textures(stats: &Stats) -> String {
-    let mut names: Vec<&str> = stats.textures.iter().map(|t| format_name(t.format)).collect();
+    let mut names: Vec<String> = stats.textures.iter().map(name).collect();
     names.dedup();
     if names.is_empty() {
         return String::new();
@@ -81,39 +81,30 @@ fn textures(stats: &Stats) -> String {
 fn loss(stats: &Stats) -> Option<String> {
     let lossy = stats.textures.iter().filter(|t| t.psnr_db.is_finite());
     let worst = lossy.min_by(|a, b| a.psnr_db.total_cmp(&b.psnr_db))?;
-    let unit = match worst.format {
-        TextureFormat::Rgba8 | TextureFormat::Bc3 | TextureFormat::Bc7 => "/255",
-        _ => "",
-    };
+    let unit = if worst.stored.is_colour() { "/255" } else { "" };
     let voxels = worst.extent.iter().map(|n| f64::from(*n)).product::<f64>();
     let bits = worst.bytes as f64 * 8.0 / voxels.max(1.0);
     Some(format!(
         "lossy {}: {bits:.0} bits a voxel, largest error {:.3}{unit}, PSNR {:.1} dB",
-        format_name(worst.format),
+        name(worst),
         worst.max_error,
         worst.psnr_db
     ))
 }
 
-fn format_name(format: TextureFormat) -> &'static str {
-    match format {
-        TextureFormat::R16 => "R16",
-        TextureFormat::R32f => "R32F",
-        TextureFormat::Bc4 => "BC4",
-        TextureFormat::Rgba8 => "RGBA8",
-        TextureFormat::Bc3 => "BC3",
-        TextureFormat::Bc7 => "BC7",
-        _ => "automatic",
-    }
+fn name(texture: &TextureSummary) -> String {
+    texture.stored.to_string().to_uppercase()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use render::TextureSummary;
+    use render::Stored;
+    use render::scene::TextureFormat;
 
     fn texture(format: TextureFormat, max_error: f64, psnr_db: f64) -> TextureSummary {
-        TextureSummary { format, extent: [64, 64, 64], bytes: 1 << 17, max_error, psnr_db, generate_ms: 1.0 }
+        let stored = Stored::Grid(format);
+        TextureSummary { stored, extent: [64, 64, 64], bytes: 1 << 17, max_error, psnr_db, generate_ms: 1.0 }
     }
 
     #[test]

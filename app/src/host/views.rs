@@ -1,7 +1,6 @@
 //! What the views show, beside the case: crosshair, sections, windows. All of it may be lost on exit.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use egui::Color32;
 use render::scene::Piece;
@@ -120,10 +119,10 @@ impl Views {
         for volume in &case.volumes {
             let Some(grid) = assets.grid(volume) else { continue };
             if !self.windows.contains_key(&volume.id) {
-                self.windows.insert(volume.id.clone(), default_window(grid));
+                self.windows.insert(volume.id.clone(), default_window(&grid));
             }
             if self.crosshair.is_none() && volume.visible {
-                self.crosshair = Some(ball_of(volume, grid).centre);
+                self.crosshair = Some(ball_of(volume, &grid).centre);
             }
         }
     }
@@ -136,10 +135,10 @@ impl Views {
             .filter_map(|volume| Some((volume, assets.grid(volume)?)))
             .enumerate()
             .map(|(index, (volume, grid))| Layer {
-                grid: Arc::clone(grid),
                 pose: volume.pose,
                 pieces: pieces_of(case, volume),
-                window: self.windows.get(&volume.id).copied().unwrap_or_else(|| default_window(grid)),
+                window: self.windows.get(&volume.id).copied().unwrap_or_else(|| default_window(&grid)),
+                grid,
                 color: TINTS[index.min(TINTS.len() - 1)],
                 share: self.fusion,
             })

@@ -9,11 +9,12 @@
 
 use std::sync::{Arc, OnceLock};
 
-use render::volume::{Grid, GridError, MeshError, SpaceError, TriangleMesh};
+use render::volume::{Grid, GridError, MeshError, Series, SeriesError, SpaceError, TriangleMesh};
 use thiserror::Error;
 
 use crate::case::Case;
 
+mod beat;
 mod body;
 mod femur;
 mod noise;
@@ -37,6 +38,9 @@ pub enum SampleError {
     /// The triangles are no mesh.
     #[error("the built-in stem could not be made ({0}); please report this")]
     Mesh(#[from] MeshError),
+    /// The steps are no series.
+    #[error("the built-in beat could not be made ({0}); please report this")]
+    Series(#[from] SeriesError),
     /// A pose is no transform.
     #[error("a pose of the built-in case could not be made ({0}); please report this")]
     Space(#[from] SpaceError),
@@ -59,6 +63,18 @@ pub fn ct() -> Result<Arc<Grid>, SampleError> {
 pub fn mri() -> Result<Arc<Grid>, SampleError> {
     static MRI: OnceLock<Result<Arc<Grid>, SampleError>> = OnceLock::new();
     MRI.get_or_init(|| scan::mri().map(Arc::new)).clone()
+}
+
+/// Name of the built-in volume over time, after `builtin:`.
+pub const BEAT: &str = "beat";
+
+/// A volume over time: 8-bit, one beat of a hollow ball. Made at the first call.
+///
+/// # Errors
+/// [`SampleError`] where the program is broken.
+pub fn beat() -> Result<Series, SampleError> {
+    static BEAT: OnceLock<Result<Series, SampleError>> = OnceLock::new();
+    BEAT.get_or_init(beat::beat).clone()
 }
 
 /// The stem implant, a closed surface that faces outwards, in its own frame: z up the stem, the neck in

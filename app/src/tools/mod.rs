@@ -8,6 +8,7 @@ use crate::host::registry::{Registry, RegistryError};
 pub mod cutting;
 pub mod fragments;
 pub mod implants;
+pub mod player;
 pub mod transfer;
 pub mod volumes;
 
@@ -24,5 +25,6 @@ pub fn register_all(registry: &mut Registry) -> Result<(), RegistryError> {
     registry.add::<cutting::Cutting>()?;
     registry.add::<fragments::Fragments>()?;
     registry.add::<implants::Implants>()?;
+    registry.add::<player::Player>()?;
     Ok(())
 }

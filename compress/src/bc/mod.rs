@@ -261,8 +261,40 @@ pub fn decode_volume(format: BlockFormat, blocks: &[u8], extent: Extent3) -> Res
     Ok(samples)
 }
 
+pub(crate) fn constant(texel: [u8; 4]) -> [u8; 16] {
+    bc3::encode(&[texel; 16], ColourWeight::Equal)
+}
+
+pub(crate) fn decode_colours(format: BlockFormat, block: &[u8]) -> [[u8; 4]; 16] {
+    match format {
+        BlockFormat::Bc1 => bc1::decode(block.try_into().unwrap()),
+        _ => bc3::decode(block.try_into().unwrap()),
+    }
+}
+
+pub(crate) fn decode_scalars(block: &[u8]) -> [u8; 16] {
+    bc4::decode(block.try_into().unwrap()).map(|[v]| v)
+}
+
+pub(crate) fn encode_row(format: BlockFormat, rows: [&[[u8; 4]]; 4], out: &mut [u8], options: EncodeOptions) {
+    for (i, block) in out.chunks_exact_mut(format.block_bytes()).enumerate() {
+        let texels = std::array::from_fn(|k| rows[k / 4][4 * i + k % 4]);
+        match format {
+            BlockFormat::Bc1 => block.copy_from_slice(&bc1::encode(&texels)),
+            _ => block.copy_from_slice(&bc3::encode(&texels, options.colour_weight)),
+        }
+    }
+}
+
+pub(crate) fn encode_scalar_row(rows: [&[u8]; 4], out: &mut [u8], _: EncodeOptions) {
+    for (i, block) in out.chunks_exact_mut(8).enumerate() {
+        let texels = std::array::from_fn(|k| [rows[k / 4][4 * i + k % 4]]);
+        block.copy_from_slice(&bc4::encode(&texels));
+    }
+}
+
 /// `len` zero bytes, or none where there is no memory for them.
-fn zeroed(len: usize) -> Option<Vec<u8>> {
+pub(crate) fn zeroed(len: usize) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();
     bytes.try_reserve_exact(len).ok()?;
     bytes.resize(len, 0);

@@ -42,6 +42,8 @@ pub struct Caps {
     pub texture_2d: u32,
     /// Largest storage buffer that a shader may see, bytes.
     pub storage_bytes: u64,
+    /// Whether the CPU does the work.
+    pub software: bool,
 }
 
 /// A graphics device and its queue.
@@ -93,6 +95,7 @@ impl Gpu {
             texture_3d: limits.max_texture_dimension_3d,
             texture_2d: limits.max_texture_dimension_2d,
             storage_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
+            software: info.device_type == wgpu::DeviceType::Cpu,
         };
         let fault = Arc::new(Mutex::new(None));
         let seen = Arc::clone(&fault);

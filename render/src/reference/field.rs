@@ -164,6 +164,7 @@ mod tests {
         let grid = Grid::new([5, 4, 3], Samples::I16(samples), Rescale::default(), Affine::identity());
         let points = vec![ControlPoint { value: 0.0, rgba: [1.0; 4] }];
         VolumeItem {
+            packed: None,
             grid: Arc::new(grid.expect("a grid")),
             pose: Affine::identity(),
             transfer: Arc::new(Transfer::new(points, 1.0).expect("a constant")),

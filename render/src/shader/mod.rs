@@ -11,6 +11,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("passes/slabs/saturate.wgsl", include_str!("../passes/slabs/saturate.wgsl")),
     ("passes/surfaces/surfaces.wgsl", include_str!("../passes/surfaces/surfaces.wgsl")),
     ("passes/present/present.wgsl", include_str!("../passes/present/present.wgsl")),
+    ("texture/pvtc.wgsl", include_str!("../texture/pvtc.wgsl")),
 ];
 
 /// The text of `name` with its imports in place; `None` where a name is not in [`SOURCES`].
@@ -82,10 +83,13 @@ pub fn mirrors() -> Vec<Mirror> {
         mirror!(crate::view::gpu_data::Form as "Form" { at_near, per_mm }),
         mirror!(crate::passes::slabs::gpu_data::Fragment as "Fragment" {
             u, v, w, gradient_x, gradient_y, gradient_z, table_scale, table_offset, table_row, unit_mm,
-            plane_first, plane_end, cylinder_first, cylinder_end,
+            plane_first, plane_end, cylinder_first, cylinder_end, channel, stack,
         }),
         mirror!(crate::passes::slabs::gpu_data::Cylinder as "Cylinder" {
             u, v, radius_mm, outside, pad_0, pad_1,
+        }),
+        mirror!(crate::texture::gpu_data::Decode as "Decode" {
+            columns, rows, layers, layer_first, s, slices, pitch, table_first, shift, top, pad_0, pad_1,
         }),
         mirror!(crate::passes::surfaces::gpu_data::Surface as "Surface" {
             view_from_mesh, normal_x, normal_y, normal_z, color, lit, mesh, pad_0, pad_1,

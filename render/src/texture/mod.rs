@@ -3,22 +3,52 @@
 //! A texture holds a box of voxels, `texture_from_voxel` maps into its 0 to 1 over texel edges. Block
 //! formats are stored as 4×4×1 blocks, slice by slice; their sides are padded to multiples of 4 by
 //! repeating the last voxel, which is also what sampling past the edge gives.
+//!
+//! The steps of a time series come compressed: `packed` sends their bytes as they are where the hardware reads
+//! them (BC1 of PVTC-TE and PVTC-SE), and decodes PVTC <S,T> on the device (`pvtc.wgsl`) or, on a software
+//! adapter, with the CPU's decoder.
 
 mod encode;
+mod packed;
 mod plan;
+mod pvtc;
+mod source;
 
+use std::fmt;
 use std::sync::Arc;
 
+pub use packed::StepDecoder;
 pub(crate) use plan::{Plan, TextureKey, is_colour};
+pub use pvtc::decode_on_device;
+pub(crate) use pvtc::gpu_data;
+pub use source::{GridSource, SourceError};
 
 use crate::gpu::{Gpu, GpuError};
 use crate::scene::TextureFormat;
-use crate::volume::Affine;
+use crate::volume::{Affine, PackedFormat, PackedStep, Point, Vector};
+use packed::PackedCache;
+
+/// How the shader reads a texel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Reading {
+    /// A value, in one channel.
+    Scalar {
+        /// 0 to 2: red, green, blue.
+        channel: usize,
+    },
+    /// Three successive slices in red, green and blue.
+    Stacked {
+        /// Slices in all.
+        slices: usize,
+    },
+    /// A pre-classified colour.
+    Colour,
+}
 
 /// A texture on the GPU, and what is known of it.
 #[derive(Debug)]
 pub(crate) struct VolumeTexture {
-    pub(crate) key: TextureKey,
+    pub(crate) reading: Reading,
     pub(crate) view: wgpu::TextureView,
     pub(crate) texture_from_voxel: Affine,
     /// `value = scale · texel + offset` for scalar formats, texel 0 to 1 (or the value itself for R32F).
@@ -27,11 +57,36 @@ pub(crate) struct VolumeTexture {
     pub(crate) summary: TextureSummary,
 }
 
+/// What the texels of a texture are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stored {
+    /// Samples or colours of a grid.
+    Grid(TextureFormat),
+    /// A step of a time series.
+    Step(PackedFormat),
+}
+
+impl Stored {
+    /// Whether texels are pre-classified colours, whose error is in 1/255.
+    pub fn is_colour(self) -> bool {
+        matches!(self, Self::Grid(format) if is_colour(format))
+    }
+}
+
+impl fmt::Display for Stored {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Grid(format) => format.fmt(f),
+            Self::Step(format) => format.fmt(f),
+        }
+    }
+}
+
 /// One texture of a frame: what it costs and how far it is from the samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TextureSummary {
-    /// The format used, which may not be the one asked for.
-    pub format: TextureFormat,
+    /// What it holds; its format may not be the one asked for.
+    pub stored: Stored,
     /// Texels along x, y and z, padding included.
     pub extent: [u32; 3],
     /// Bytes in texture memory.
@@ -42,84 +97,132 @@ pub struct TextureSummary {
     /// Peak signal-to-noise ratio of the texels, dB; the peak is the value range, or 255. Infinite where
     /// nothing is lost.
     pub psnr_db: f64,
-    /// Time to make the texels from the samples, ms; upload not counted.
+    /// Time to make the texels from the samples, ms; measuring their error and upload not counted.
     pub generate_ms: f64,
 }
 
 impl VolumeTexture {
     /// Makes the texels and hands them to the device.
-    pub(crate) fn new(gpu: &Gpu, plan: &Plan) -> Result<Self, GpuError> {
-        let start = std::time::Instant::now();
+    fn new(gpu: &Gpu, plan: &Plan) -> Result<Self, GpuError> {
         let texels = encode::encode(plan)?;
-        let generate_ms = start.elapsed().as_secs_f64() * 1e3;
-        let [width, height, depth] = texels.extent;
         let format = match plan.key.format {
             TextureFormat::R32f => wgpu::TextureFormat::R32Float,
             TextureFormat::Bc4 => wgpu::TextureFormat::Bc4RUnorm,
             TextureFormat::Rgba8 => wgpu::TextureFormat::Rgba8Unorm,
             TextureFormat::Bc3 => wgpu::TextureFormat::Bc3RgbaUnorm,
+            TextureFormat::Bc7 => wgpu::TextureFormat::Bc7RgbaUnorm,
             _ => wgpu::TextureFormat::R16Unorm,
         };
-        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("volume.texture"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: depth },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D3,
-            format,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
-        let block = u32::from(format.is_compressed()) * 3 + 1;
-        let row = width / block * format.block_copy_size(None).unwrap_or(1);
-        gpu.queue.write_texture(
-            texture.as_image_copy(),
-            &texels.bytes,
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(row),
-                rows_per_image: Some(height / block),
-            },
-            texture.size(),
-        );
+        let texture = create(gpu, format, texels.extent);
+        write(gpu, &texture, &texels.bytes);
         gpu.check()?;
         Ok(Self {
-            key: plan.key.clone(),
+            reading: if is_colour(plan.key.format) {
+                Reading::Colour
+            } else {
+                Reading::Scalar { channel: 0 }
+            },
             view: texture.create_view(&wgpu::TextureViewDescriptor::default()),
             texture_from_voxel: plan.texture_from_voxel(texels.extent),
             value_scale: texels.value_scale,
             value_offset: texels.value_offset,
             summary: TextureSummary {
-                format: plan.key.format,
+                stored: Stored::Grid(plan.key.format),
                 extent: texels.extent,
                 bytes: texels.bytes.len() as u64,
                 max_error: texels.max_error,
                 psnr_db: texels.psnr_db,
-                generate_ms,
+                generate_ms: texels.generate_ms,
             },
         })
     }
 }
 
+/// An empty 3D texture of `extent` texels, whole blocks.
+fn create(gpu: &Gpu, format: wgpu::TextureFormat, extent: [u32; 3]) -> wgpu::Texture {
+    let [width, height, depth_or_array_layers] = extent;
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("volume.texture"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D3,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_DST
+            | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}
+
+/// Fills a texture with its texels or blocks, tightly packed, x fastest.
+fn write(gpu: &Gpu, texture: &wgpu::Texture, bytes: &[u8]) {
+    let (format, size) = (texture.format(), texture.size());
+    let block = u32::from(format.is_compressed()) * 3 + 1;
+    gpu.queue.write_texture(
+        texture.as_image_copy(),
+        bytes,
+        wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(size.width / block * format.block_copy_size(None).unwrap_or(1)),
+            rows_per_image: Some(size.height / block),
+        },
+        size,
+    );
+}
+
+/// 0 to 1 over the edges of `extent` texels, the first of which is voxel 0.
+fn texture_from_voxel(extent: [f64; 3]) -> Affine {
+    let column = |a: usize| {
+        let mut v = Vector::zeros();
+        v[a] = 1.0 / extent[a];
+        v
+    };
+    // A diagonal of positive numbers has an inverse.
+    Affine::from_columns(column(0), column(1), column(2), Point::from(extent.map(|n| 0.5 / n)))
+        .unwrap_or_default()
+}
+
 /// Textures kept from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct TextureCache {
-    kept: Vec<Arc<VolumeTexture>>,
+    kept: Vec<(TextureKey, Arc<VolumeTexture>)>,
+    packed: PackedCache,
+    sent: u64,
 }
 
 impl TextureCache {
     /// The texture of a plan: the one kept, or a new one.
     pub(crate) fn get(&mut self, gpu: &Gpu, plan: &Plan) -> Result<Arc<VolumeTexture>, GpuError> {
-        if let Some(found) = self.kept.iter().find(|t| t.key.is_same(&plan.key)) {
+        if let Some((_, found)) = self.kept.iter().find(|(key, _)| key.is_same(&plan.key)) {
             return Ok(Arc::clone(found));
         }
         let made = Arc::new(VolumeTexture::new(gpu, plan)?);
-        self.kept.push(Arc::clone(&made));
+        self.sent += 1;
+        self.kept.push((plan.key.clone(), Arc::clone(&made)));
         Ok(made)
+    }
+
+    /// The texture of a step: the one kept, or a new one.
+    pub(crate) fn step(&mut self, gpu: &Gpu, step: &PackedStep) -> Result<Arc<VolumeTexture>, GpuError> {
+        let (texture, is_new) = self.packed.get(gpu, step)?;
+        self.sent += u64::from(is_new);
+        Ok(texture)
+    }
+
+    /// Textures sent to the device since the last call.
+    pub(crate) fn take_sent(&mut self) -> u64 {
+        std::mem::take(&mut self.sent)
+    }
+
+    /// What decodes the steps from now on.
+    pub(crate) fn set_decoder(&mut self, decoder: StepDecoder) {
+        self.packed.set_decoder(decoder);
     }
 
     /// Lets go of what nobody but the cache holds.
     pub(crate) fn forget_unused(&mut self) {
-        self.kept.retain(|t| Arc::strong_count(t) > 1);
+        self.kept.retain(|(_, t)| Arc::strong_count(t) > 1);
+        self.packed.forget_unused();
     }
 }

@@ -105,9 +105,10 @@ fn available(asked: TextureFormat, caps: Caps, notes: &mut Vec<String>) -> Textu
     };
     let scalar = if caps.norm16 { F::R16 } else { F::R32f };
     match asked {
-        F::Bc3 if !caps.bc_3d => replaced(F::Rgba8, "this GPU has no block compression in 3D textures"),
+        F::Bc3 | F::Bc7 if !caps.bc_3d => {
+            replaced(F::Rgba8, "this GPU has no block compression in 3D textures")
+        }
         F::Bc4 if !caps.bc_3d => replaced(scalar, "this GPU has no block compression in 3D textures"),
-        F::Bc7 => replaced(F::Rgba8, "there is no BC7 encoder yet"),
         F::R32f if !caps.float_filter && caps.norm16 => {
             replaced(F::R16, "this GPU does not filter 32-bit floats")
         }

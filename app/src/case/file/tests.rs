@@ -6,7 +6,7 @@ use crate::case::{Edit, edit};
 /// A case with every kind of thing and an unknown key at every level.
 const FULL: &str = r#"{
   "osteotome": 1, "later": {"deep": [1, {"x": null}]}, "name": "left hip",
-  "volumes": [{"id": "ct", "source": "ct/", "item": 2, "texture": "bc3", "shading": "gradient",
+  "volumes": [{"id": "ct", "source": "ct/", "item": 2, "step": 5, "texture": "bc3", "shading": "gradient",
     "window": [40, 400], "visible": false,
     "pose": [0,-1,0,5, 1,0,0,-7.25, 0,0,1,0.1, 0,0,0,1],
     "transfer": {"points": [[-1024,0,0,0,0],[300,0.85,0.6,0.4,0.25]], "unit_mm": 2.5, "preset": "mine"}}],
@@ -42,6 +42,7 @@ fn a_round_trip_keeps_everything_unknown_keys_too() {
         "/volumes/0/window",
         "/volumes/0/transfer/preset",
         "/volumes/0/item",
+        "/volumes/0/step",
         "/volumes/0/texture",
         "/volumes/0/shading",
         "/volumes/0/visible",
@@ -116,6 +117,7 @@ fn every_broken_field_is_named_with_its_fault() {
         ("/volumes/0/id", "\"\"", "volumes[0].id", "empty"),
         ("/volumes/0/source", "\"\"", "volumes[0].source", "empty"),
         ("/volumes/0/item", "-1", "volumes[0].item", "whole number"),
+        ("/volumes/0/step", "1.5", "volumes[0].step", "whole number"),
         ("/volumes/0/visible", "1", "volumes[0].visible", "true or false"),
         ("/volumes/0/texture", "\"dxt5\"", "volumes[0].texture", "\"dxt5\""),
         ("/volumes/0/shading", "\"headlight\"", "volumes[0].shading", "headlight"),

@@ -144,7 +144,7 @@ fn chosen_ui(
         theme::quiet_ui(ui, "The volume is not loaded.");
         return;
     };
-    let centre = tool.middle(ctx, volume, grid, fragment);
+    let centre = tool.middle(ctx, volume, &grid, fragment);
     // The direction of the chosen cutter, where this fragment was cut by it.
     let offered = ctx.cutter().filter(|c| fragment.keep.contains_key(&c.id)).and_then(|c| {
         let axis = match c.cutter {

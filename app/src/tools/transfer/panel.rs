@@ -17,7 +17,7 @@ pub(super) fn show_ui(tool: &mut TransferTool, ctx: &mut ToolContext<'_>, ui: &m
         theme::quiet_ui(ui, "No volume yet. Open one in the panel Volumes.");
         return;
     };
-    let Some(grid) = ctx.assets.grid(volume).cloned() else {
+    let Some(grid) = ctx.assets.grid(volume) else {
         theme::quiet_ui(ui, "The volume is not loaded.");
         return;
     };

@@ -91,7 +91,7 @@ fn chosen_ui(pose: &mut PoseEditor, ctx: &mut ToolContext<'_>, ui: &mut Ui, volu
         }
         window_ui(ctx, ui, volume, grid.range());
         texture_ui(ctx, ui, volume);
-        let centre = views::ball_of(volume, grid).centre;
+        let centre = views::ball_of(volume, &grid).centre;
         ui.collapsing("Place in the world", |ui| {
             // The middle in its own place is before the pose.
             let own = volume.pose.inverse().point(&centre);

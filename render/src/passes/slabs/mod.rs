@@ -36,6 +36,8 @@ pub(crate) enum Kind {
     Scalar = 1,
     ScalarLit = 2,
     Color = 3,
+    Stacked = 4,
+    StackedLit = 5,
 }
 
 /// GPU mirrors of `slabs.wgsl`.
@@ -60,6 +62,8 @@ pub(crate) mod gpu_data {
         pub(crate) plane_end: u32,
         pub(crate) cylinder_first: u32,
         pub(crate) cylinder_end: u32,
+        pub(crate) channel: [f32; 4],
+        pub(crate) stack: [f32; 4],
     }
 
     /// `Cylinder`.

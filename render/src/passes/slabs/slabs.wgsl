@@ -35,6 +35,9 @@ struct Fragment {
     plane_end: u32,
     cylinder_first: u32,
     cylinder_end: u32,
+    // Which channel of a texel is the value; x and y of `stack`: slices and layers of three slices each.
+    channel: vec4<f32>,
+    stack: vec4<f32>,
 }
 
 struct Cylinder {
@@ -88,6 +91,9 @@ const KIND_NONE: u32 = 0u;
 const KIND_SCALAR: u32 = 1u;
 const KIND_SCALAR_LIT: u32 = 2u;
 const KIND_COLOR: u32 = 3u;
+// Three successive slices in the channels of a texel (PVTC-SE).
+const KIND_STACKED: u32 = 4u;
+const KIND_STACKED_LIT: u32 = 5u;
 
 struct VertexOut {
     @builtin(position) position: vec4<f32>,
@@ -215,13 +221,35 @@ fn extinction_of(texel: vec4<f32>, unit_mm: f32) -> vec4<f32> {
     return vec4<f32>(texel.rgb * tau, tau);
 }
 
+// A slice of a stacked texture, filtered within itself: the sample is taken at its layer's middle.
+fn slice_value(volume: texture_3d<f32>, at: vec2<f32>, slice: f32, layers: f32) -> f32 {
+    let layer = floor((slice + 0.5) / 3.0);
+    let texel = textureSampleLevel(volume, linear, vec3<f32>(at, (layer + 0.5) / layers), 0.0);
+    let channel = slice - 3.0 * layer;
+    return select(select(texel.b, texel.g, channel < 1.5), texel.r, channel < 0.5);
+}
+
+// The texel value of a fragment at a place.
+fn value_at(kind: u32, id: u32, volume: texture_3d<f32>, at: vec3<f32>) -> f32 {
+    if kind == KIND_STACKED || kind == KIND_STACKED_LIT {
+        let slices = fragments[id].stack.x;
+        let layers = fragments[id].stack.y;
+        let z = clamp(at.z * slices - 0.5, 0.0, slices - 1.0);
+        let below = floor(z);
+        let a = slice_value(volume, at.xy, below, layers);
+        let b = slice_value(volume, at.xy, min(below + 1.0, slices - 1.0), layers);
+        return a + (b - a) * (z - below);
+    }
+    return dot(textureSampleLevel(volume, linear, at, 0.0), fragments[id].channel);
+}
+
 // Takes the sample at the slot's start.
 fn begin(kind: u32, slot: ptr<function, Slot>, id: u32, volume: texture_3d<f32>) {
-    let texel = textureSampleLevel(volume, linear, place(slot, (*slot).zeta), 0.0);
+    let at = place(slot, (*slot).zeta);
     if kind == KIND_COLOR {
-        (*slot).high = extinction_of(texel, fragments[id].unit_mm);
+        (*slot).high = extinction_of(textureSampleLevel(volume, linear, at, 0.0), fragments[id].unit_mm);
     } else {
-        (*slot).position = texel.r * fragments[id].table_scale + fragments[id].table_offset;
+        (*slot).position = value_at(kind, id, volume, at) * fragments[id].table_scale + fragments[id].table_offset;
         var high: vec4<f32>;
         var low: vec4<f32>;
         antiderivative((*slot).position, fragments[id].table_row, &high, &low);
@@ -251,13 +279,13 @@ fn kept_length(slot: ptr<function, Slot>, a: f32, b: f32) -> f32 {
 }
 
 // |n·v| of the gradient at a place, or -1 where the field is flat.
-fn facing(id: u32, volume: texture_3d<f32>, at: vec3<f32>, ray: vec3<f32>) -> f32 {
+fn facing(kind: u32, id: u32, volume: texture_3d<f32>, at: vec3<f32>, ray: vec3<f32>) -> f32 {
     let x = vec3<f32>(fragments[id].gradient_x.w, 0.0, 0.0);
     let y = vec3<f32>(0.0, fragments[id].gradient_y.w, 0.0);
     let z = vec3<f32>(0.0, 0.0, fragments[id].gradient_z.w);
-    let dx = textureSampleLevel(volume, linear, at + x, 0.0).r - textureSampleLevel(volume, linear, at - x, 0.0).r;
-    let dy = textureSampleLevel(volume, linear, at + y, 0.0).r - textureSampleLevel(volume, linear, at - y, 0.0).r;
-    let dz = textureSampleLevel(volume, linear, at + z, 0.0).r - textureSampleLevel(volume, linear, at - z, 0.0).r;
+    let dx = value_at(kind, id, volume, at + x) - value_at(kind, id, volume, at - x);
+    let dy = value_at(kind, id, volume, at + y) - value_at(kind, id, volume, at - y);
+    let dz = value_at(kind, id, volume, at + z) - value_at(kind, id, volume, at - z);
     let gradient = dx * fragments[id].gradient_x.xyz
         + dy * fragments[id].gradient_y.xyz
         + dz * fragments[id].gradient_z.xyz;
@@ -284,16 +312,16 @@ fn advance(
     if GAPS {
         span = kept_length(slot, a, b);
     }
-    let texel = textureSampleLevel(volume, linear, place(slot, b), 0.0);
+    let at = place(slot, b);
     var mean: vec4<f32>;
     if kind == KIND_COLOR {
-        let here = extinction_of(texel, fragments[id].unit_mm);
+        let here = extinction_of(textureSampleLevel(volume, linear, at, 0.0), fragments[id].unit_mm);
         mean = 0.5 * ((*slot).high + here);
         (*slot).high = here;
     } else {
         let row = fragments[id].table_row;
         let before = (*slot).position;
-        let here = texel.r * fragments[id].table_scale + fragments[id].table_offset;
+        let here = value_at(kind, id, volume, at) * fragments[id].table_scale + fragments[id].table_offset;
         var high: vec4<f32>;
         var low: vec4<f32>;
         antiderivative(here, row, &high, &low);
@@ -307,8 +335,8 @@ fn advance(
         (*slot).position = here;
         (*slot).high = high;
         (*slot).low = low;
-        if kind == KIND_SCALAR_LIT && mean.a > 0.0 {
-            let toward = facing(id, volume, place(slot, 0.5 * (a + b)), ray.xyz);
+        if (kind == KIND_SCALAR_LIT || kind == KIND_STACKED_LIT) && mean.a > 0.0 {
+            let toward = facing(kind, id, volume, place(slot, 0.5 * (a + b)), ray.xyz);
             if toward >= 0.0 {
                 mean = vec4<f32>(lit(mean.rgb / mean.a, toward) * mean.a, mean.a);
             }

@@ -28,6 +28,7 @@ fn flat(rgba: [f64; 4]) -> Arc<Transfer> {
 
 fn volume(grid: Grid, transfer: Arc<Transfer>) -> VolumeItem {
     VolumeItem {
+        packed: None,
         grid: Arc::new(grid),
         pose: Affine::identity(),
         transfer,
