@@ -3,8 +3,7 @@
 //! **Order** is that of a *sliced* 3D texture, which Vulkan and WebGPU read: blocks of 4×4×1 voxels, block x
 //! fastest, then block y, then z. A volume of any extent is covered; where a block reaches over the far edge in x
 //! or y, the last voxel is repeated, which costs the encoder nothing and never bleeds another colour into the
-//! edge. **Work** is gathered in units of 4×4×4 voxels as Doi does, four blocks one behind the other, since
-//! neighbours in z are alike; rows of units are spread over threads, and the bytes are the same for any number of
+//! edge. **Work** is a row of blocks; rows are spread over threads, and the bytes are the same for any number of
 //! threads.
 //!
 //! **Samples** are 4 bytes a voxel, R G B A, for [`BlockFormat::Bc1`] and [`BlockFormat::Bc3`], and 1 byte for
@@ -95,18 +94,36 @@ pub enum ColourWeight {
     Equal,
 }
 
+/// What an encoder spends its time on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Level {
+    /// End points from the range of a block, once: for volumes that change while they are looked at.
+    Fast,
+    /// End points that are fitted to the block.
+    #[default]
+    Best,
+}
+
 /// Choices of an encoder.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct EncodeOptions {
     /// How voxels share in the colours of a BC3 block; of no effect in BC1, which is opaque, and BC4.
     pub colour_weight: ColourWeight,
+    /// What the time is spent on.
+    pub level: Level,
 }
 
 impl EncodeOptions {
     /// These options with another weight of colours.
     pub fn with_colour_weight(mut self, colour_weight: ColourWeight) -> Self {
         self.colour_weight = colour_weight;
+        self
+    }
+
+    /// These options with another level.
+    pub fn with_level(mut self, level: Level) -> Self {
+        self.level = level;
         self
     }
 }
@@ -186,11 +203,21 @@ pub fn encode_volume_with(
     let bytes = format.encoded_len(extent);
     let mut blocks = zeroed(bytes).ok_or(EncodeError::OutOfMemory { bytes })?;
     match format {
-        BlockFormat::Bc1 => block::encode(samples, extent, &mut blocks, bc1::encode),
-        BlockFormat::Bc3 => {
-            block::encode(samples, extent, &mut blocks, |texels| bc3::encode(texels, options.colour_weight));
+        BlockFormat::Bc1 => {
+            block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+                bc1::encode_row(rows, blocks, options);
+            })
         }
-        BlockFormat::Bc4 => block::encode(samples, extent, &mut blocks, bc4::encode),
+        BlockFormat::Bc3 => {
+            block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+                bc3::encode_row(rows, blocks, options);
+            })
+        }
+        BlockFormat::Bc4 => {
+            block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+                bc4::encode_row(rows.map(<[[u8; 1]]>::as_flattened), blocks, options);
+            })
+        }
     }
     Ok(blocks)
 }
