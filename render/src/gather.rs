@@ -260,7 +260,7 @@ impl Gathered {
             let mut channel = [0.0; 4];
             let mut stack = [0.0; 4];
             match texture.reading {
-                Reading::Scalar { channel: which } => channel[which] = 1.0,
+                Reading::Scalar { weights } => channel = weights,
                 Reading::Stacked { slices } => {
                     stack = [slices as f32, texture.summary.extent[2] as f32, 0.0, 0.0];
                 }

@@ -13,7 +13,7 @@ use crate::scene::Scene;
 use crate::target::{Target, buffer_entry};
 use crate::texture::{StepDecoder, TextureCache, TextureSummary, VolumeTexture};
 use crate::view::{View, gpu_data};
-use crate::volume::PackedStep;
+use crate::volume::{Grid, PackedStep};
 
 /// How fine the sub-steps along a ray are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,6 +138,21 @@ impl Renderer {
     /// What decodes the steps of time series from now on; [`StepDecoder::Auto`] at first.
     pub fn set_step_decoder(&mut self, decoder: StepDecoder) {
         self.textures.set_decoder(decoder);
+    }
+
+    /// Takes `new` for `old` from now on, which differs from it only in the voxels from `touched[0]` to before
+    /// `touched[1]` (after painting): of textures in BC3, BC4 and BC7 only the blocks that hold those are encoded and
+    /// sent. Returns the blocks sent, and those that could stay.
+    ///
+    /// # Errors
+    /// [`GpuError`]: what the encoder or the device reports.
+    pub fn replace_grid(
+        &mut self,
+        old: &Arc<Grid>,
+        new: &Arc<Grid>,
+        touched: [[usize; 3]; 2],
+    ) -> Result<[u64; 2], GpuError> {
+        self.textures.replace(&self.gpu, old, new, touched)
     }
 
     /// Sends a step of a time series to the device before it is drawn, and keeps it for the next picture in place of

@@ -36,7 +36,7 @@ pub mod light {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum TextureFormat {
-    /// The renderer's choice: [`TextureFormat::R16`] where it fits.
+    /// The renderer's choice: [`TextureFormat::R16`] where it fits, else the most accurate that does.
     Auto,
     /// 16 bits a voxel over the grid's range; exact for whole numbers that span less than 65 536.
     R16,
@@ -44,6 +44,8 @@ pub enum TextureFormat {
     R32f,
     /// BC4 blocks of the scalar, 4 bits a voxel; classified after interpolation.
     Bc4,
+    /// Scalar in the two planes of BC5 blocks, coarse and residual, 8 bits a voxel; classified after interpolation.
+    Bc5,
     /// Pre-classified colour, 32 bits a voxel.
     Rgba8,
     /// Pre-classified colour in BC3 (DXT5) blocks, 8 bits a voxel: Doi's format.
@@ -60,6 +62,7 @@ impl TextureFormat {
             Self::R16 => "r16",
             Self::R32f => "r32f",
             Self::Bc4 => "bc4",
+            Self::Bc5 => "bc5",
             Self::Rgba8 => "rgba8",
             Self::Bc3 => "bc3",
             Self::Bc7 => "bc7",

@@ -317,9 +317,12 @@ fn the_eye_may_be_inside_the_volume_or_look_along_up() {
 
 #[test]
 fn lossy_textures_state_their_error_and_stay_near() {
-    for (format, psnr_db) in
-        [(TextureFormat::Bc4, 45.0), (TextureFormat::Rgba8, 30.0), (TextureFormat::Bc3, 28.0)]
-    {
+    for (format, psnr_db) in [
+        (TextureFormat::Bc4, 45.0),
+        (TextureFormat::Bc5, 52.0),
+        (TextureFormat::Rgba8, 30.0),
+        (TextureFormat::Bc3, 28.0),
+    ] {
         let s = scene(vec![volume(format)], vec![]);
         let stats = agrees(&s, "lossy texture", psnr_db, 128.0);
         for t in &stats.textures {
@@ -417,4 +420,37 @@ fn pictures_that_cannot_be_are_errors() {
     let mut blind = s;
     blind.camera.target = blind.camera.eye;
     assert!(matches!(renderer.render(&blind, SIZE, Quality::Good), Err(GpuError::Camera(_))), "no direction");
+}
+
+#[test]
+fn touched_voxels_cost_their_own_blocks_and_the_picture_is_that_of_the_whole() {
+    if !has_gpu() {
+        return;
+    }
+    let old = grid();
+    let touched = [[20, 15, 10], [27, 22, 14]];
+    let inside = |p: [usize; 3]| (0..3).all(|a| (touched[0][a]..touched[1][a]).contains(&p[a]));
+    let [nx, ny, _] = old.extent();
+    let painted = (0..48 * 40 * 32).map(|i| {
+        let value = old.value_at(i) as i16;
+        if inside([i % nx, i / nx % ny, i / (nx * ny)]) { value.max(500) } else { value }
+    });
+    let samples = Samples::I16(painted.collect());
+    let new =
+        Arc::new(Grid::new([48, 40, 32], samples, Rescale::default(), *old.world_from_voxel()).unwrap());
+    assert_eq!(old.range(), new.range(), "the window of values stays");
+    for texture in [TextureFormat::Bc3, TextureFormat::Bc4] {
+        let with =
+            |grid: &Arc<Grid>| scene(vec![VolumeItem { grid: Arc::clone(grid), ..volume(texture) }], vec![]);
+        let whole = draw(&with(&new), Quality::Good).unwrap().0;
+        let mut renderer = renderer();
+        renderer.render(&with(&old), SIZE, Quality::Good).unwrap();
+        assert_ne!(renderer.read().unwrap().pixels, whole.pixels, "{texture}: it shows");
+        let [sent, stayed] = renderer.replace_grid(&old, &new, touched).unwrap();
+        assert!((16..=36).contains(&sent), "{texture}: {sent} blocks for a box of 7 x 7 x 4 voxels");
+        assert!(stayed > 10 * sent, "{texture}: {stayed} blocks stayed");
+        let stats = renderer.render(&with(&new), SIZE, Quality::Good).unwrap();
+        assert_eq!(stats.textures_sent, 0, "{texture}: no texture was made anew");
+        assert_eq!(renderer.read().unwrap().pixels, whole.pixels, "{texture}: the picture of the whole");
+    }
 }

@@ -44,6 +44,9 @@ pub struct Caps {
     pub storage_bytes: u64,
     /// Whether the CPU does the work.
     pub software: bool,
+    /// Bytes that the texture of one volume may take where its format is left to the renderer. No interface tells
+    /// how much memory there is: it is what a small graphics card can spare.
+    pub texture_budget: u64,
 }
 
 /// A graphics device and its queue.
@@ -96,6 +99,7 @@ impl Gpu {
             texture_2d: limits.max_texture_dimension_2d,
             storage_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
             software: info.device_type == wgpu::DeviceType::Cpu,
+            texture_budget: 1 << 30,
         };
         let fault = Arc::new(Mutex::new(None));
         let seen = Arc::clone(&fault);

@@ -1,12 +1,13 @@
 //! From samples to texels, in parallel, with the error that it costs: [`compress::texture`] on a box of a grid.
 
 use compress::bc::EncodeOptions;
-use compress::texture::{Loss, Mapping, Source, TexelFormat};
+use compress::bc::two_plane::{Scales, encode_two_planes};
+use compress::texture::{Loss, Mapping, Patch, Source, TexelFormat};
 use compress::{BlockFormat, Extent3};
 use rayon::prelude::*;
 
-use super::GridSource;
 use super::plan::{Plan, is_colour};
+use super::{GridSource, Reading};
 use crate::gpu::GpuError;
 use crate::scene::TextureFormat;
 use crate::volume::{Grid, Rescale, Samples};
@@ -17,6 +18,7 @@ pub(crate) struct Texels {
     pub(crate) bytes: Vec<u8>,
     /// Texels along each axis, padded to whole blocks.
     pub(crate) extent: [u32; 3],
+    pub(crate) reading: Reading,
     pub(crate) value_scale: f64,
     pub(crate) value_offset: f64,
     pub(crate) max_error: f64,
@@ -40,16 +42,21 @@ pub(crate) fn encode(plan: &Plan) -> Result<Texels, GpuError> {
         let psnr_db =
             if max_error > 0.0 { 20.0 * (span * 3.0_f64.sqrt() / max_error).log10() } else { f64::INFINITY };
         let extent = plan.texels().map(|n| n as u32);
-        let (value_scale, value_offset) = (1.0, 0.0);
+        let (reading, value_scale, value_offset) = (Reading::channel(0), 1.0, 0.0);
+        let generate_ms = ms();
         return Ok(Texels {
             bytes,
             extent,
+            reading,
             value_scale,
             value_offset,
             max_error,
             psnr_db,
-            generate_ms: ms(),
+            generate_ms,
         });
+    }
+    if plan.key.format == TextureFormat::Bc5 {
+        return two_planes(plan, begin);
     }
     let coarse;
     let stored = if plan.key.reduce == [1; 3] {
@@ -104,15 +111,80 @@ pub(crate) fn encode(plan: &Plan) -> Result<Texels, GpuError> {
             (last - first, first, stored.unit(), span)
         }
     };
+    let reading = if is_colour(plan.key.format) { Reading::Colour } else { Reading::channel(0) };
     Ok(Texels {
         bytes,
         extent,
+        reading,
         value_scale,
         value_offset,
         max_error: loss.largest * unit,
         psnr_db: loss.psnr_db(peak / unit),
         generate_ms,
     })
+}
+
+/// A scalar in two planes: the sum of red and green, weighted, is the value, also between texels.
+fn two_planes(plan: &Plan, begin: std::time::Instant) -> Result<Texels, GpuError> {
+    let [nx, ny, nz] = plan.texels();
+    let mut values = vec![0.0_f32; nx * ny * nz];
+    values.par_chunks_mut(nx).enumerate().for_each(|(row, out)| {
+        for (x, value) in out.iter_mut().enumerate() {
+            *value = mean(plan, [x, row % ny, row / ny]) as f32;
+        }
+    });
+    let extent = Extent3::new(plan.texels().map(|n| n as u32)).map_err(failed)?;
+    let made = encode_two_planes(&values, extent, plan.key.grid.range()).map_err(failed)?;
+    let Scales { offset, coarse, residual } = made.scales;
+    let [x, y, z] = extent.sizes();
+    Ok(Texels {
+        bytes: made.blocks,
+        extent: [x.next_multiple_of(4), y.next_multiple_of(4), z],
+        reading: Reading::Scalar { weights: [1.0, (residual / coarse) as f32, 0.0, 0.0] },
+        value_scale: coarse,
+        value_offset: offset - 0.5 * residual,
+        max_error: made.quality.largest,
+        psnr_db: made.quality.psnr_db,
+        generate_ms: begin.elapsed().as_secs_f64() * 1e3,
+    })
+}
+
+/// The blocks of a plan's texture that hold any of the voxels from `touched[0]` to before `touched[1]` of its grid, in
+/// texels of the texture; none where the texture is not of blocks or cannot keep its window, empty where it holds
+/// none of them.
+pub(crate) fn patch(plan: &Plan, old: &Grid, touched: [[usize; 3]; 2]) -> Result<Option<Patch>, GpuError> {
+    let key = &plan.key;
+    let format = match key.format {
+        TextureFormat::Bc4 => BlockFormat::Bc4,
+        TextureFormat::Bc3 => BlockFormat::Bc3,
+        TextureFormat::Bc7 => BlockFormat::Bc7,
+        _ => return Ok(None),
+    };
+    let grid = key.grid.as_ref();
+    if key.reduce != [1; 3] || format == BlockFormat::Bc4 && grid.range() != old.range() {
+        return Ok(None);
+    }
+    let start = [0, 1, 2].map(|a| touched[0][a].max(key.low[a]));
+    let end = [0, 1, 2].map(|a| touched[1][a].min(key.high[a] + 1));
+    if (0..3).any(|a| start[a] >= end[a]) {
+        return Ok(Some(Patch { low: [0; 3], size: [0; 3], blocks: Vec::new() }));
+    }
+    let stored = GridSource::new(grid).map_err(failed)?;
+    let (table, window);
+    let mapping = if let Some(transfer) = &key.transfer {
+        table = stored.table(transfer).map_err(failed)?;
+        Mapping::Colours(&table)
+    } else {
+        window = stored.window(grid.range()).map_err(failed)?;
+        Mapping::Scalars(&window)
+    };
+    let texels = Extent3::new(plan.texels().map(|n| n as u32)).map_err(failed)?;
+    let part =
+        stored.volume().and_then(|v| Ok(v.part(key.low.map(|n| n as u32), texels)?)).map_err(failed)?;
+    let source = Source::new(part, mapping).map_err(failed)?;
+    let within = |at: [usize; 3]| [0, 1, 2].map(|a| (at[a] - key.low[a]) as u32);
+    let patch = source.blocks_of(format, EncodeOptions::default(), within(start)..within(end));
+    patch.map(Some).map_err(failed)
 }
 
 fn exact_in_f32(grid: &Grid) -> bool {

@@ -25,16 +25,16 @@ pub use source::{GridSource, SourceError};
 
 use crate::gpu::{Gpu, GpuError};
 use crate::scene::TextureFormat;
-use crate::volume::{Affine, PackedFormat, PackedStep, Point, Vector};
+use crate::volume::{Affine, Grid, PackedFormat, PackedStep, Point, Vector};
 use packed::PackedCache;
 
 /// How the shader reads a texel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Reading {
-    /// A value, in one channel.
+    /// A value: the sum of the channels, weighted.
     Scalar {
-        /// 0 to 2: red, green, blue.
-        channel: usize,
+        /// Of red, green, blue and alpha.
+        weights: [f32; 4],
     },
     /// Three successive slices in red, green and blue.
     Stacked {
@@ -45,10 +45,20 @@ pub(crate) enum Reading {
     Colour,
 }
 
+impl Reading {
+    /// A value in one channel: 0 to 2 are red, green, blue.
+    pub(crate) fn channel(channel: usize) -> Self {
+        let mut weights = [0.0; 4];
+        weights[channel] = 1.0;
+        Self::Scalar { weights }
+    }
+}
+
 /// A texture on the GPU, and what is known of it.
 #[derive(Debug)]
 pub(crate) struct VolumeTexture {
     pub(crate) reading: Reading,
+    texture: wgpu::Texture,
     pub(crate) view: wgpu::TextureView,
     pub(crate) texture_from_voxel: Affine,
     /// `value = scale · texel + offset` for scalar formats, texel 0 to 1 (or the value itself for R32F).
@@ -108,6 +118,7 @@ impl VolumeTexture {
         let format = match plan.key.format {
             TextureFormat::R32f => wgpu::TextureFormat::R32Float,
             TextureFormat::Bc4 => wgpu::TextureFormat::Bc4RUnorm,
+            TextureFormat::Bc5 => wgpu::TextureFormat::Bc5RgUnorm,
             TextureFormat::Rgba8 => wgpu::TextureFormat::Rgba8Unorm,
             TextureFormat::Bc3 => wgpu::TextureFormat::Bc3RgbaUnorm,
             TextureFormat::Bc7 => wgpu::TextureFormat::Bc7RgbaUnorm,
@@ -117,12 +128,9 @@ impl VolumeTexture {
         write(gpu, &texture, &texels.bytes);
         gpu.check()?;
         Ok(Self {
-            reading: if is_colour(plan.key.format) {
-                Reading::Colour
-            } else {
-                Reading::Scalar { channel: 0 }
-            },
+            reading: texels.reading,
             view: texture.create_view(&wgpu::TextureViewDescriptor::default()),
+            texture,
             texture_from_voxel: plan.texture_from_voxel(texels.extent),
             value_scale: texels.value_scale,
             value_offset: texels.value_offset,
@@ -201,6 +209,50 @@ impl TextureCache {
         self.sent += 1;
         self.kept.push((plan.key.clone(), Arc::clone(&made)));
         Ok(made)
+    }
+
+    /// Puts `new` in the place of `old`, which it differs from only in the voxels from `touched[0]` to before
+    /// `touched[1]`: textures of blocks get the blocks that hold them, the others are made anew when they are drawn.
+    /// Returns the blocks sent, and the blocks that were not.
+    pub(crate) fn replace(
+        &mut self,
+        gpu: &Gpu,
+        old: &Arc<Grid>,
+        new: &Arc<Grid>,
+        touched: [[usize; 3]; 2],
+    ) -> Result<[u64; 2], GpuError> {
+        let mut sent = [0; 2];
+        let mut kept = Vec::with_capacity(self.kept.len());
+        for (mut key, texture) in self.kept.drain(..) {
+            if Arc::ptr_eq(&key.grid, old) {
+                key.grid = Arc::clone(new);
+                let Some(patch) = encode::patch(&Plan { key: key.clone() }, old, touched)? else { continue };
+                let (size, origin) = (patch.size, patch.low);
+                if !patch.blocks.is_empty() {
+                    let block = texture.texture.format().block_copy_size(None).unwrap_or(16);
+                    gpu.queue.write_texture(
+                        wgpu::TexelCopyTextureInfo {
+                            origin: wgpu::Origin3d { x: origin[0], y: origin[1], z: origin[2] },
+                            ..texture.texture.as_image_copy()
+                        },
+                        &patch.blocks,
+                        wgpu::TexelCopyBufferLayout {
+                            offset: 0,
+                            bytes_per_row: Some(size[0] / 4 * block),
+                            rows_per_image: Some(size[1] / 4),
+                        },
+                        wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: size[2] },
+                    );
+                }
+                let blocks = |size: [u32; 3]| size.iter().map(|&n| u64::from(n)).product::<u64>() / 16;
+                let here = if patch.blocks.is_empty() { 0 } else { blocks(size) };
+                sent = [sent[0] + here, sent[1] + blocks(texture.summary.extent) - here];
+            }
+            kept.push((key, texture));
+        }
+        self.kept = kept;
+        gpu.check()?;
+        Ok(sent)
     }
 
     /// The texture of a step: the one kept, or a new one.

@@ -30,7 +30,7 @@ pub enum StepDecoder {
     /// The device, unless it is software: then the CPU's decoder is the shorter way.
     #[default]
     Auto,
-    /// A compute shader, one invocation a sub-volume.
+    /// A compute shader, one invocation a sub-volume; the CPU where the bytes are more than a binding holds.
     Device,
     /// The CPU's decoder, and the decoded samples are sent.
     Cpu,
@@ -40,7 +40,6 @@ pub enum StepDecoder {
 #[derive(Debug)]
 struct Kept {
     step: PackedStep,
-    texture: wgpu::Texture,
     made: Arc<VolumeTexture>,
 }
 
@@ -74,7 +73,7 @@ impl PackedCache {
         // The three steps of PVTC-TE lie in one texture.
         let shared = self.kept.iter().find(|k| form.is_shared && k.step.shares_bytes(step));
         let (texture, is_new) = if let Some(kept) = shared {
-            (kept.texture.clone(), false)
+            (kept.made.texture.clone(), false)
         } else {
             let texture = self.empty(gpu, &form);
             self.fill(gpu, step, &form, &texture)?;
@@ -82,7 +81,7 @@ impl PackedCache {
         };
         let made = Arc::new(form.texture(step, &texture, begin));
         gpu.check()?;
-        self.kept.push(Kept { step: step.clone(), texture, made: Arc::clone(&made) });
+        self.kept.push(Kept { step: step.clone(), made: Arc::clone(&made) });
         Ok((made, is_new))
     }
 
@@ -91,9 +90,10 @@ impl PackedCache {
         let (kept, unused): (Vec<Kept>, Vec<Kept>) =
             self.kept.drain(..).partition(|k| Arc::strong_count(&k.made) > 1);
         for old in unused {
-            let known = kept.iter().map(|k| &k.texture).chain(&self.spare).any(|t| *t == old.texture);
+            let known =
+                kept.iter().map(|k| &k.made.texture).chain(&self.spare).any(|t| *t == old.made.texture);
             if !known {
-                self.spare.push(old.texture);
+                self.spare.push(old.made.texture.clone());
             }
         }
         self.kept = kept;
@@ -128,8 +128,9 @@ impl PackedCache {
             (Source::Decoded, PackedFormat::Pvtc { s, t }) => {
                 let layout = pvtc::Layout::new(s, t).map_err(failed)?;
                 let extent = extent(step)?;
+                let is_long = step.bytes().len() as u64 > gpu.caps().storage_bytes;
                 let software = self.choice == StepDecoder::Auto && gpu.caps().software;
-                if self.choice == StepDecoder::Cpu || software {
+                if self.choice == StepDecoder::Cpu || software || is_long {
                     self.samples.resize(extent.voxels(), 0);
                     pvtc::decode_step(layout, step.bytes(), extent, step.step(), &mut self.samples)
                         .map_err(failed)?;
@@ -181,7 +182,7 @@ impl Form {
     fn new(gpu: &Gpu, step: &PackedStep) -> Self {
         let [x, y, z] = step.extent().map(|n| n as u32);
         let (bc, norm16) = (gpu.caps().bc_3d, gpu.caps().norm16);
-        let plain = Reading::Scalar { channel: 0 };
+        let plain = Reading::channel(0);
         let decoded = Self {
             format: wgpu::TextureFormat::R8Unorm,
             texels: [x, y, z],
@@ -204,7 +205,7 @@ impl Form {
             PackedFormat::R16 => {
                 Self { format: wgpu::TextureFormat::R32Float, source: Source::Floats, ..decoded }
             }
-            PackedFormat::Te if bc => blocks(z, Reading::Scalar { channel: step.step() }, true),
+            PackedFormat::Te if bc => blocks(z, Reading::channel(step.step()), true),
             PackedFormat::Se if bc => blocks(z.div_ceil(3), Reading::Stacked { slices: z as usize }, false),
             PackedFormat::Pvtc { .. } | PackedFormat::Te | PackedFormat::Se => decoded,
         }
@@ -223,6 +224,7 @@ impl Form {
         };
         VolumeTexture {
             reading: self.reading,
+            texture: texture.clone(),
             view: texture.create_view(&wgpu::TextureViewDescriptor::default()),
             texture_from_voxel: texture_from_voxel(cover),
             value_scale: step.rescale().slope * step.top(),

@@ -55,7 +55,18 @@ impl Plan {
         let inside = |c: f64, axis: usize| (c.max(0.0) as usize).min(extent[axis] - 1);
         let low = [0, 1, 2].map(|a| inside(bounds[0][a].floor() - 1.0, a));
         let high = [0, 1, 2].map(|a| inside(bounds[1][a].ceil() + 1.0, a));
-        let format = available(asked, caps, notes);
+        let texels = [0, 1, 2].map(|a| high[a] - low[a] + 1);
+        let format =
+            available(if asked == TextureFormat::Auto { fitting(texels, caps) } else { asked }, caps, notes);
+        if asked == TextureFormat::Auto && matches!(format, TextureFormat::Bc4 | TextureFormat::Bc5) {
+            notes.push(format!(
+                "a volume of {} x {} x {} is kept as {format}: 16 bits a voxel would take more than {} MiB",
+                texels[0],
+                texels[1],
+                texels[2],
+                caps.texture_budget >> 20
+            ));
+        }
         let reduce = [0, 1, 2].map(|a| (high[a] - low[a] + 1).div_ceil(caps.texture_3d as usize & !3));
         if reduce != [1; 3] {
             notes.push(format!(
@@ -96,6 +107,16 @@ pub(crate) fn is_colour(format: TextureFormat) -> bool {
     matches!(format, TextureFormat::Rgba8 | TextureFormat::Bc3 | TextureFormat::Bc7)
 }
 
+/// The most accurate format of scalars that one volume may take memory for.
+fn fitting(texels: [usize; 3], caps: Caps) -> TextureFormat {
+    let voxels: u64 = texels.iter().map(|&n| n as u64).product();
+    match caps.texture_budget / voxels.max(1) {
+        0 => TextureFormat::Bc4,
+        1 => TextureFormat::Bc5,
+        _ => TextureFormat::Auto,
+    }
+}
+
 /// The format asked for, or the nearest that the device has, with a note.
 fn available(asked: TextureFormat, caps: Caps, notes: &mut Vec<String>) -> TextureFormat {
     use TextureFormat as F;
@@ -108,7 +129,9 @@ fn available(asked: TextureFormat, caps: Caps, notes: &mut Vec<String>) -> Textu
         F::Bc3 | F::Bc7 if !caps.bc_3d => {
             replaced(F::Rgba8, "this GPU has no block compression in 3D textures")
         }
-        F::Bc4 if !caps.bc_3d => replaced(scalar, "this GPU has no block compression in 3D textures"),
+        F::Bc4 | F::Bc5 if !caps.bc_3d => {
+            replaced(scalar, "this GPU has no block compression in 3D textures")
+        }
         F::R32f if !caps.float_filter && caps.norm16 => {
             replaced(F::R16, "this GPU does not filter 32-bit floats")
         }

@@ -35,7 +35,7 @@ struct Fragment {
     plane_end: u32,
     cylinder_first: u32,
     cylinder_end: u32,
-    // Which channel of a texel is the value; x and y of `stack`: slices and layers of three slices each.
+    // What each channel of a texel adds to the value; x and y of `stack`: slices and layers of three slices each.
     channel: vec4<f32>,
     stack: vec4<f32>,
 }
