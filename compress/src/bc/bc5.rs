@@ -3,15 +3,16 @@
 //! Source: KDFS, "RGTC Compressed Texture Image Formats", section "BC5 unsigned".
 
 use super::bc4;
-use super::block::Texels;
+use super::block::{Texels, texels};
 
-/// Encodes one block.
-pub(super) fn encode(texels: &Texels<2>) -> [u8; 16] {
-    let mut block = [0; 16];
-    for (channel, half) in block.chunks_exact_mut(8).enumerate() {
-        half.copy_from_slice(&bc4::encode(&texels.map(|texel| [texel[channel]])));
+/// Encodes a row of blocks: `rows` are its four rows of voxels.
+pub(super) fn encode_row(rows: [&[[u8; 2]]; 4], blocks: &mut [u8]) {
+    for (x, block) in blocks.chunks_exact_mut(16).enumerate() {
+        let texels = texels(rows, x);
+        for (channel, half) in block.chunks_exact_mut(8).enumerate() {
+            half.copy_from_slice(&bc4::encode(&texels.map(|texel| [texel[channel]])));
+        }
     }
-    block
 }
 
 /// Decodes one block.

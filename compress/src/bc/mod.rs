@@ -3,13 +3,12 @@
 //! **Order** is that of a *sliced* 3D texture, which Vulkan and WebGPU read: blocks of 4×4×1 voxels, block x
 //! fastest, then block y, then z. A volume of any extent is covered; where a block reaches over the far edge in x
 //! or y, the last voxel is repeated, which costs the encoder nothing and never bleeds another colour into the
-//! edge. **Work** is gathered in units of 4×4×4 voxels as Doi does, four blocks one behind the other, since
-//! neighbours in z are alike; rows of units are spread over threads, and the bytes are the same for any number of
+//! edge. **Work** is a row of blocks; rows are spread over threads, and the bytes are the same for any number of
 //! threads.
 //!
 //! **Samples** are 4 bytes a voxel, R G B A, for [`BlockFormat::Bc1`], [`BlockFormat::Bc3`] and [`BlockFormat::Bc7`],
-//! 2 bytes for [`BlockFormat::Bc5`], and 1 byte for [`BlockFormat::Bc4`]; `[x, y, z]`, x fastest. BC1 is written in its opaque mode of four colours, alpha is not
-//! kept; its decoder knows the other mode too, where index 3 is transparent black.
+//! 2 bytes for [`BlockFormat::Bc5`], and 1 byte for [`BlockFormat::Bc4`]; `[x, y, z]`, x fastest. BC1 is written in its
+//! opaque mode of four colours, alpha is not kept; its decoder knows the other mode too, where index 3 is transparent black.
 //!
 //! **Rounding.** The standard gives the interpolated values as fractions; the decoders here round them to the
 //! nearest 8-bit value once, at the end. Hardware may differ by 1 or 2; in BC7 it may not, and does not.
@@ -110,12 +109,12 @@ pub enum ColourWeight {
     Equal,
 }
 
-/// How much an encoder tries.
+/// What an encoder spends its time on.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Level {
-    /// For a transfer function that is being changed: what costs little.
+    /// End points from the range of a block, once: for volumes that change while they are looked at.
     Fast,
-    /// For a volume that stays: all that is known to help.
+    /// End points that are fitted to the block.
     #[default]
     Best,
 }
@@ -126,7 +125,7 @@ pub enum Level {
 pub struct EncodeOptions {
     /// How voxels share in the colours of a BC3 or BC7 block; of no effect in the other formats.
     pub colour_weight: ColourWeight,
-    /// How much the encoder tries; of effect in BC7.
+    /// What the time is spent on.
     pub level: Level,
 }
 
@@ -219,15 +218,26 @@ pub fn encode_volume_with(
     let bytes = format.encoded_len(extent);
     let mut blocks = zeroed(bytes).ok_or(EncodeError::OutOfMemory { bytes })?;
     match format {
-        BlockFormat::Bc1 => block::encode(samples, extent, &mut blocks, bc1::encode),
-        BlockFormat::Bc3 => {
-            block::encode(samples, extent, &mut blocks, |texels| bc3::encode(texels, options.colour_weight));
+        BlockFormat::Bc1 => {
+            block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+                bc1::encode_row(rows, blocks, options);
+            });
         }
-        BlockFormat::Bc4 => block::encode(samples, extent, &mut blocks, bc4::encode),
-        BlockFormat::Bc5 => block::encode(samples, extent, &mut blocks, bc5::encode),
+        BlockFormat::Bc3 => {
+            block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+                bc3::encode_row(rows, blocks, options);
+            });
+        }
+        BlockFormat::Bc4 => {
+            block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+                bc4::encode_row(rows.map(<[[u8; 1]]>::as_flattened), blocks, options);
+            });
+        }
+        BlockFormat::Bc5 => {
+            block::encode(samples, extent, &mut blocks, format.block_bytes(), bc5::encode_row);
+        }
         BlockFormat::Bc7 => {
-            let (voxels, _) = samples.as_chunks::<4>();
-            block::encode_rows(voxels, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+            block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
                 bc7::encode_row(rows, blocks, options);
             });
         }
