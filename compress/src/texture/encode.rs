@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::bricks::SkipMap;
 use super::curve;
 use super::table::ColourTable;
+use super::rows::{Cell, EDGE, Rows, VOXELS, indices, least_and_most, range};
 use super::volume::Volume;
 use super::window::Window;
 use super::{EncodeStats, Part};
@@ -19,70 +20,14 @@ use crate::bc::{self, EncodeOptions, Level};
 use crate::BlockFormat;
 use crate::simd::Simd;
 
-/// Voxels of a block along x, and along y.
-const EDGE: usize = 4;
-
 /// Blocks of one task, about: enough that starting it costs nothing, few enough to share out evenly.
 const TASK_BLOCKS: usize = 2048;
 
 /// Blocks that are handed to a kernel together.
 const BATCH: usize = curve::BATCH;
 
-/// Four rows of voxels as table indices, and what is known of each block in them.
-#[derive(Debug)]
-pub(super) struct Strip {
-    rows: [Vec<u16>; EDGE],
-    /// The least and the greatest index of each block.
-    low: Vec<u16>,
-    high: Vec<u16>,
-}
-
-impl Strip {
-    /// Buffers for rows of at most `blocks` blocks.
-    pub(super) fn new(blocks: usize) -> Self {
-        let row = || vec![0; blocks * EDGE];
-        Self { rows: [row(), row(), row(), row()], low: vec![0; blocks], high: vec![0; blocks] }
-    }
-
-    /// Reads `count` blocks from block `[x, y, z]` of the volume on. Past its edges the last voxel is repeated.
-    #[inline(always)]
-    pub(super) fn read(
-        &mut self,
-        volume: &Volume<'_>,
-        domain: &super::Domain,
-        [x, y, z]: [usize; 3],
-        count: usize,
-    ) {
-        let last = volume.extent().y() - 1;
-        for (j, row) in self.rows.iter_mut().enumerate() {
-            volume.indices(domain, [x * EDGE, (y * EDGE + j).min(last), z], &mut row[..count * EDGE]);
-        }
-        let [a, b, c, d] = self.rows.each_ref().map(|row| row[..count * EDGE].as_chunks::<EDGE>().0);
-        let (low, high) = (&mut self.low[..count], &mut self.high[..count]);
-        for i in 0..count {
-            let (mut least, mut most) = ([0; EDGE], [0; EDGE]);
-            for lane in 0..EDGE {
-                let [a, b, c, d] = [a[i][lane], b[i][lane], c[i][lane], d[i][lane]];
-                least[lane] = a.min(b).min(c.min(d));
-                most[lane] = a.max(b).max(c.max(d));
-            }
-            low[i] = least[0].min(least[1]).min(least[2].min(least[3]));
-            high[i] = most[0].max(most[1]).max(most[2].max(most[3]));
-        }
-    }
-
-    /// The least and the greatest index of block `i` of those read.
-    #[inline(always)]
-    pub(super) fn range(&self, i: usize) -> [u16; 2] {
-        [self.low[i], self.high[i]]
-    }
-
-    /// The indices of row `j` of block `i` of those read.
-    #[inline(always)]
-    pub(super) fn block_row(&self, i: usize, j: usize) -> &[u16] {
-        &self.rows[j][i * EDGE..][..EDGE]
-    }
-}
+/// Blocks that are looked at together, to find that they are one constant.
+const GROUP: usize = 8;
 
 /// Blocks of texels that wait to be encoded; `N` bytes a texel.
 #[derive(Debug)]
@@ -99,14 +44,11 @@ impl<const N: usize> TexelBatch<N> {
         Self { rows: [[[0; N]; BATCH * EDGE]; EDGE], at: [0; BATCH], len: 0 }
     }
 
-    /// Adds block `i` of a strip, as block `at` of the output; says whether the batch is full.
+    /// Adds a block, as block `at` of the output; says whether the batch is full.
     #[inline(always)]
-    fn push(&mut self, strip: &Strip, i: usize, texel: impl Fn(u16) -> [u8; N], at: usize) -> bool {
-        for (j, row) in self.rows.iter_mut().enumerate() {
-            let out = &mut row[self.len * EDGE..][..EDGE];
-            for (out, index) in out.iter_mut().zip(strip.block_row(i, j)) {
-                *out = texel(*index);
-            }
+    fn push(&mut self, texels: &[[u8; N]; VOXELS], at: usize) -> bool {
+        for (row, texels) in self.rows.iter_mut().zip(texels.as_chunks::<EDGE>().0) {
+            row[self.len * EDGE..][..EDGE].copy_from_slice(texels);
         }
         self.at[self.len] = at as u32;
         self.len += 1;
@@ -119,6 +61,9 @@ impl<const N: usize> TexelBatch<N> {
         blocks: &mut [[u8; BYTES]],
         encode_row: impl FnOnce([&[[u8; N]]; EDGE], &mut [u8]),
     ) {
+        if self.len == 0 {
+            return;
+        }
         let mut encoded = [[0; BYTES]; BATCH];
         let encoded = &mut encoded[..self.len];
         encode_row(self.rows.each_ref().map(|row| &row[..self.len * EDGE]), encoded.as_flattened_mut());
@@ -131,8 +76,8 @@ impl<const N: usize> TexelBatch<N> {
 
 /// What one thread works with.
 #[derive(Debug)]
-struct Scratch {
-    strip: Strip,
+struct Scratch<T> {
+    rows: Rows<T>,
     curve: Box<curve::Batch>,
     colours: Box<TexelBatch<4>>,
     scalars: Box<TexelBatch<1>>,
@@ -140,10 +85,10 @@ struct Scratch {
     known: Vec<Option<u16>>,
 }
 
-impl Scratch {
+impl<T: Cell> Scratch<T> {
     fn new(blocks: usize) -> Self {
         Self {
-            strip: Strip::new(blocks),
+            rows: Rows::new(blocks),
             curve: Box::new(curve::Batch::new()),
             colours: Box::new(TexelBatch::new()),
             scalars: Box::new(TexelBatch::new()),
@@ -165,10 +110,10 @@ pub(super) struct Job<'a> {
 impl Job<'_> {
     /// Runs `row` on each row of blocks of the part, in parallel over tasks of some rows. It is given the task's
     /// blocks, where in them its row begins, and the first block of the row in the volume.
-    fn rows<const BYTES: usize>(
+    fn rows<T: Cell, const BYTES: usize>(
         &self,
         blocks: &mut [u8],
-        task: impl Fn(&mut Scratch, &mut [[u8; BYTES]], usize) -> EncodeStats + Sync,
+        task: impl Fn(&mut Scratch<T>, &mut [[u8; BYTES]], usize) -> EncodeStats + Sync,
     ) -> EncodeStats {
         let row = self.part.count[0];
         let rows = (TASK_BLOCKS / row).max(1);
@@ -180,10 +125,17 @@ impl Job<'_> {
             .reduce(EncodeStats::default, EncodeStats::plus)
     }
 
-    /// What is known beforehand of the blocks of a row that begins at block `at`.
-    fn know(&self, at: [usize; 3], known: &mut [Option<u16>]) {
-        if let Some(skip) = self.skip {
-            skip.know(&self.volume, at, known);
+    /// The stretches of a row that begins at block `at`: of blocks that are known to be of one run, and of blocks to
+    /// be read.
+    #[inline(always)]
+    fn spans<'b>(&self, at: [usize; 3], known: &'b mut [Option<u16>]) -> Spans<'b> {
+        let len = known.len();
+        match self.skip {
+            Some(skip) => {
+                skip.know(&self.volume, at, known);
+                Spans { known, at: 0, len }
+            }
+            None => Spans { known: &[], at: 0, len },
         }
     }
 
@@ -194,14 +146,36 @@ impl Job<'_> {
     }
 }
 
+/// Stretches of a row of `len` blocks, of which all is known or nothing.
+struct Spans<'a> {
+    known: &'a [Option<u16>],
+    at: usize,
+    len: usize,
+}
+
+impl Iterator for Spans<'_> {
+    type Item = (Range<usize>, Option<u16>);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
+        let (start, known) = (self.at, self.known.get(self.at).copied().flatten());
+        let same = |other: &&Option<u16>| **other == known;
+        self.at = match self.known {
+            [] => self.len,
+            all => start + all[start..].iter().take_while(same).count(),
+        };
+        (start < self.len).then_some((start..self.at, known))
+    }
+}
+
 /// Encodes the colours of a part as BC3, or as BC1 if a block has 8 bytes.
-pub(super) fn colours<const BYTES: usize>(
+pub(super) fn colours<T: Cell, const BYTES: usize>(
     job: &Job<'_>,
     table: &ColourTable,
     format: BlockFormat,
     blocks: &mut [u8],
 ) -> EncodeStats {
-    job.rows::<BYTES>(blocks, |scratch, blocks, first| match job.simd {
+    job.rows::<T, BYTES>(blocks, |scratch, blocks, first| match job.simd {
         Simd::Plain => colour_task(job, table, format, scratch, blocks, first),
         #[cfg(target_arch = "x86_64")]
         Simd::Avx2(_) => {
@@ -216,11 +190,11 @@ pub(super) fn colours<const BYTES: usize>(
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-fn colour_task_avx2<const BYTES: usize>(
+fn colour_task_avx2<T: Cell, const BYTES: usize>(
     job: &Job<'_>,
     table: &ColourTable,
     format: BlockFormat,
-    scratch: &mut Scratch,
+    scratch: &mut Scratch<T>,
     blocks: &mut [[u8; BYTES]],
     first: usize,
 ) -> EncodeStats {
@@ -229,60 +203,119 @@ fn colour_task_avx2<const BYTES: usize>(
 
 /// Encodes some rows of blocks, `first` of the part and those after it.
 #[inline(always)]
-fn colour_task<const BYTES: usize>(
+fn colour_task<T: Cell, const BYTES: usize>(
     job: &Job<'_>,
     table: &ColourTable,
     format: BlockFormat,
-    scratch: &mut Scratch,
+    scratch: &mut Scratch<T>,
     blocks: &mut [[u8; BYTES]],
     first: usize,
 ) -> EncodeStats {
-    let mut stats = EncodeStats { blocks: blocks.len() as u64, ..EncodeStats::default() };
-    let Scratch { strip, curve, colours, known, .. } = scratch;
-    let encode = |rows: [&[[u8; 4]]; EDGE], out: &mut [u8]| bc::encode_row(format, rows, out, job.options);
-    let constants = table.constants();
-    let constant = |run: u16| {
-        let constant = &constants[usize::from(run)];
-        (constant.clear, constant.block::<BYTES>())
+    let mut task = ColourTask {
+        table,
+        format,
+        options: job.options,
+        bounds: T::bounds(table.domain()),
+        curve: &mut scratch.curve,
+        colours: &mut scratch.colours,
+        blocks,
+        stats: EncodeStats::default(),
     };
     let width = job.part.count[0];
-    for row in 0..blocks.len() / width {
-        let at = job.row_at(first + row);
-        job.know(at, known);
-        for (span, run) in spans(known) {
-            let begin = row * width + span.start;
+    for row in 0..task.blocks.len() / width {
+        let ([x, y, z], begin) = (job.row_at(first + row), row * width);
+        for (span, run) in job.spans([x, y, z], &mut scratch.known) {
+            let at = begin + span.start;
             if let Some(run) = run {
-                blocks[begin..begin + span.len()].fill(constant(run).1);
-                stats.skipped += span.len() as u64;
-                continue;
+                task.blocks[at..at + span.len()].fill(table.constant(run).block());
+                task.stats.skipped += span.len() as u64;
+            } else {
+                let rows = scratch.rows.of(&job.volume, table.domain(), [x + span.start, y, z], span.len());
+                task.span(rows, at);
             }
-            strip.read(&job.volume, table.domain(), [at[0] + span.start, at[1], at[2]], span.len());
-            for i in 0..span.len() {
-                let range = strip.range(i);
-                if let Some(run) = table.run(range) {
-                    let (clear, block) = constant(run);
-                    blocks[begin + i] = block;
-                    stats.clear += u64::from(clear);
-                    stats.solid += u64::from(!clear);
-                } else if job.options.level == Level::Fast && table.is_straight(range) {
-                    stats.curve += 1;
-                    if curve.push(strip, i, table, begin + i) {
-                        curve.flush(blocks);
-                    }
-                } else if colours.push(strip, i, |index| table.texels()[usize::from(index)], begin + i) {
-                    colours.flush(blocks, encode);
+        }
+    }
+    task.curve.flush(task.blocks);
+    task.flush_colours();
+    EncodeStats { blocks: task.blocks.len() as u64, ..task.stats }
+}
+
+/// Some rows of blocks of colours on the way.
+struct ColourTask<'a, T, const BYTES: usize> {
+    table: &'a ColourTable,
+    format: BlockFormat,
+    options: EncodeOptions,
+    bounds: [T; 2],
+    curve: &'a mut curve::Batch,
+    colours: &'a mut TexelBatch<4>,
+    blocks: &'a mut [[u8; BYTES]],
+    stats: EncodeStats,
+}
+
+impl<T: Cell, const BYTES: usize> ColourTask<'_, T, BYTES> {
+    /// Encodes the blocks of four rows, from block `at` of the output on.
+    #[inline(always)]
+    fn span(&mut self, [a, b, c, d]: [&[T]; EDGE], at: usize) {
+        const WIDE: usize = GROUP * EDGE;
+        let (wide_a, rest_a) = a.as_chunks::<WIDE>();
+        let (wide_b, rest_b) = b.as_chunks::<WIDE>();
+        let (wide_c, rest_c) = c.as_chunks::<WIDE>();
+        let (wide_d, rest_d) = d.as_chunks::<WIDE>();
+        for (group, (((a, b), c), d)) in wide_a.iter().zip(wide_b).zip(wide_c).zip(wide_d).enumerate() {
+            let at = at + group * GROUP;
+            let [least, most] = range([a, b, c, d]);
+            match self.table.run([least.index(self.bounds), most.index(self.bounds)]) {
+                Some(run) => self.constants(run, at, GROUP),
+                None => self.each([a, b, c, d], at),
+            }
+        }
+        self.each([rest_a, rest_b, rest_c, rest_d], at + wide_a.len() * GROUP);
+    }
+
+    /// Writes constants of one run.
+    #[inline(always)]
+    fn constants(&mut self, run: u16, at: usize, count: usize) {
+        let constant = self.table.constant(run);
+        self.blocks[at..at + count].fill(constant.block());
+        *(if constant.clear { &mut self.stats.clear } else { &mut self.stats.solid }) += count as u64;
+    }
+
+    /// Encodes the blocks of four rows one by one.
+    #[inline(always)]
+    fn each(&mut self, [a, b, c, d]: [&[T]; EDGE], at: usize) {
+        let [(a, _), (b, _), (c, _), (d, _)] =
+            [a.as_chunks::<EDGE>(), b.as_chunks::<EDGE>(), c.as_chunks::<EDGE>(), d.as_chunks::<EDGE>()];
+        for (i, (((a, b), c), d)) in a.iter().zip(b).zip(c).zip(d).enumerate() {
+            let indices = indices([a, b, c, d], self.bounds);
+            let range = least_and_most(&indices);
+            if let Some(run) = self.table.run(range) {
+                self.constants(run, at + i, 1);
+            } else if self.options.level == Level::Fast && self.table.is_straight(range) {
+                self.stats.curve += 1;
+                if self.curve.push(&indices, range, self.table, at + i) {
+                    self.curve.flush(self.blocks);
+                }
+            } else {
+                let mut texels = [[0; 4]; VOXELS];
+                for (texel, index) in texels.iter_mut().zip(indices) {
+                    *texel = self.table.texels()[usize::from(index)];
+                }
+                if self.colours.push(&texels, at + i) {
+                    self.flush_colours();
                 }
             }
         }
     }
-    curve.flush(blocks);
-    colours.flush(blocks, encode);
-    stats
+
+    fn flush_colours(&mut self) {
+        let (format, options) = (self.format, self.options);
+        self.colours.flush(self.blocks, |rows, out| bc::encode_row(format, rows, out, options));
+    }
 }
 
 /// Encodes the scalars of a part as BC4.
-pub(super) fn scalars(job: &Job<'_>, window: &Window, blocks: &mut [u8]) -> EncodeStats {
-    job.rows::<8>(blocks, |scratch, blocks, first| match job.simd {
+pub(super) fn scalars<T: Cell>(job: &Job<'_>, window: &Window, blocks: &mut [u8]) -> EncodeStats {
+    job.rows::<T, 8>(blocks, |scratch, blocks, first| match job.simd {
         Simd::Plain => scalar_task(job, window, scratch, blocks, first),
         #[cfg(target_arch = "x86_64")]
         Simd::Avx2(_) => {
@@ -297,10 +330,10 @@ pub(super) fn scalars(job: &Job<'_>, window: &Window, blocks: &mut [u8]) -> Enco
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-fn scalar_task_avx2(
+fn scalar_task_avx2<T: Cell>(
     job: &Job<'_>,
     window: &Window,
-    scratch: &mut Scratch,
+    scratch: &mut Scratch<T>,
     blocks: &mut [[u8; 8]],
     first: usize,
 ) -> EncodeStats {
@@ -309,52 +342,80 @@ fn scalar_task_avx2(
 
 /// Encodes some rows of blocks, `first` of the part and those after it.
 #[inline(always)]
-fn scalar_task(
+fn scalar_task<T: Cell>(
     job: &Job<'_>,
     window: &Window,
-    scratch: &mut Scratch,
+    scratch: &mut Scratch<T>,
     blocks: &mut [[u8; 8]],
     first: usize,
 ) -> EncodeStats {
-    let mut stats = EncodeStats { blocks: blocks.len() as u64, ..EncodeStats::default() };
-    let Scratch { strip, scalars, known, .. } = scratch;
-    let encode = |rows: [&[[u8; 1]]; EDGE], out: &mut [u8]| {
-        bc::encode_scalar_row(rows.map(|row| row.as_flattened()), out, job.options);
+    let mut task = ScalarTask {
+        window,
+        options: job.options,
+        bounds: T::bounds(window.domain()),
+        scalars: &mut scratch.scalars,
+        blocks,
+        stats: EncodeStats::default(),
     };
-    // Both ends the same, all indices 0.
-    let constant = |texel: u8| [texel, texel, 0, 0, 0, 0, 0, 0];
     let width = job.part.count[0];
-    for row in 0..blocks.len() / width {
-        let at = job.row_at(first + row);
-        job.know(at, known);
-        for (span, texel) in spans(known) {
-            let begin = row * width + span.start;
+    for row in 0..task.blocks.len() / width {
+        let ([x, y, z], begin) = (job.row_at(first + row), row * width);
+        for (span, texel) in job.spans([x, y, z], &mut scratch.known) {
+            let at = begin + span.start;
             if let Some(texel) = texel {
-                blocks[begin..begin + span.len()].fill(constant(texel as u8));
-                stats.skipped += span.len() as u64;
-                continue;
-            }
-            strip.read(&job.volume, window.domain(), [at[0] + span.start, at[1], at[2]], span.len());
-            for i in 0..span.len() {
-                let [low, high] = strip.range(i).map(|index| window.texel(index));
-                if low == high {
-                    blocks[begin + i] = constant(low);
-                    stats.solid += 1;
-                } else if scalars.push(strip, i, |index| [window.texel(index)], begin + i) {
-                    scalars.flush(blocks, encode);
-                }
+                task.blocks[at..at + span.len()].fill(solid(texel as u8));
+                task.stats.skipped += span.len() as u64;
+            } else {
+                let rows = scratch.rows.of(&job.volume, window.domain(), [x + span.start, y, z], span.len());
+                task.span(rows, at);
             }
         }
     }
-    scalars.flush(blocks, encode);
-    stats
+    task.flush();
+    EncodeStats { blocks: task.blocks.len() as u64, ..task.stats }
 }
 
-/// The stretches of blocks that are known to be of one run, and those that are to be read.
-fn spans(known: &[Option<u16>]) -> impl Iterator<Item = (Range<usize>, Option<u16>)> {
-    known.chunk_by(|a, b| a == b).scan(0, |start, chunk| {
-        let first = *start;
-        *start += chunk.len();
-        Some((first..*start, chunk[0]))
-    })
+/// Some rows of blocks of scalars on the way.
+struct ScalarTask<'a, T> {
+    window: &'a Window,
+    options: EncodeOptions,
+    bounds: [T; 2],
+    scalars: &'a mut TexelBatch<1>,
+    blocks: &'a mut [[u8; 8]],
+    stats: EncodeStats,
+}
+
+impl<T: Cell> ScalarTask<'_, T> {
+    /// Encodes the blocks of four rows, from block `at` of the output on.
+    #[inline(always)]
+    fn span(&mut self, [a, b, c, d]: [&[T]; EDGE], at: usize) {
+        let [(a, _), (b, _), (c, _), (d, _)] =
+            [a.as_chunks::<EDGE>(), b.as_chunks::<EDGE>(), c.as_chunks::<EDGE>(), d.as_chunks::<EDGE>()];
+        for (i, (((a, b), c), d)) in a.iter().zip(b).zip(c).zip(d).enumerate() {
+            let indices = indices([a, b, c, d], self.bounds);
+            let mut texels = [[0; 1]; VOXELS];
+            for (texel, index) in texels.iter_mut().zip(indices) {
+                *texel = [self.window.texel(index)];
+            }
+            let [low, high] = least_and_most(&texels);
+            if low == high {
+                self.blocks[at + i] = solid(low[0]);
+                self.stats.solid += 1;
+            } else if self.scalars.push(&texels, at + i) {
+                self.flush();
+            }
+        }
+    }
+
+    fn flush(&mut self) {
+        let options = self.options;
+        self.scalars.flush(self.blocks, |rows, out| {
+            bc::encode_scalar_row(rows.map(|row| row.as_flattened()), out, options);
+        });
+    }
+}
+
+/// The block of BC4 of one texel: both ends the same, all indices 0.
+fn solid(texel: u8) -> [u8; 8] {
+    [texel, texel, 0, 0, 0, 0, 0, 0]
 }

@@ -4,14 +4,11 @@ use rayon::prelude::*;
 
 use super::Mapping;
 use super::domain::{Domain, SampleKind};
-use super::encode::Strip;
+use super::rows::{Cell, EDGE, Rows, VOXELS, indices, least_and_most};
 use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
 use crate::{BlockFormat, bc};
-
-/// Voxels of a block along x, and along y.
-const EDGE: usize = 4;
 
 /// The error of a texture over all voxels of its volume.
 ///
@@ -63,7 +60,7 @@ trait Errors: Sync {
     type Texel: Copy;
     fn domain(&self) -> &Domain;
     /// The texels of the block with these bytes.
-    fn decode(&self, block: &[u8]) -> [Self::Texel; EDGE * EDGE];
+    fn decode(&self, block: &[u8]) -> [Self::Texel; VOXELS];
     /// The error of a texel where a voxel of this index is.
     fn error(&self, index: u16, texel: Self::Texel) -> Sum;
     /// If the block is the constant that its range of indices makes: the error of each index in it, none if there are
@@ -116,7 +113,7 @@ impl Errors for ColourErrors<'_> {
         self.table.domain()
     }
 
-    fn decode(&self, block: &[u8]) -> [[u8; 4]; EDGE * EDGE] {
+    fn decode(&self, block: &[u8]) -> [[u8; 4]; VOXELS] {
         bc::decode_colours(self.format, block)
     }
 
@@ -159,7 +156,7 @@ impl Errors for ScalarErrors<'_> {
         self.window.domain()
     }
 
-    fn decode(&self, block: &[u8]) -> [u8; EDGE * EDGE] {
+    fn decode(&self, block: &[u8]) -> [u8; VOXELS] {
         bc::decode_scalars(block)
     }
 
@@ -220,18 +217,21 @@ fn of_steps(loss: Loss, domain: &Domain) -> Loss {
 fn sum_of_blocks<E: Errors>(volume: &Volume<'_>, errors: &E, block_bytes: usize, blocks: &[u8]) -> Loss {
     let extent = volume.extent();
     let [width, height, _] = extent.blocks();
+    let bounds = u16::bounds(errors.domain());
     let rows = blocks.par_chunks_exact(width * block_bytes).enumerate();
     let sums: Vec<Loss> = rows
         .map_init(
-            || Strip::new(width),
-            |strip, (row, blocks)| {
+            || Rows::<u16>::new(width),
+            |rows, (row, blocks)| {
                 let [y, z] = [row % height, row / height];
-                strip.read(volume, errors.domain(), [0, y, z], width);
+                let rows = rows.of(volume, errors.domain(), [0, y, z], width);
                 let mut loss = NONE;
-                for (i, block) in blocks.chunks_exact(block_bytes).enumerate() {
+                let [a, b, c, d] = rows.map(|row| row.as_chunks::<EDGE>().0);
+                for (i, bytes) in blocks.chunks_exact(block_bytes).enumerate() {
                     // Voxels past the edges are not there to be wrong.
                     let inside = [(extent.x() - EDGE * i).min(EDGE), (extent.y() - EDGE * y).min(EDGE)];
-                    let [squares, largest] = of_block(strip, i, inside, errors, block);
+                    let indices = indices([&a[i], &b[i], &c[i], &d[i]], bounds);
+                    let [squares, largest] = of_block(&indices, inside, errors, bytes);
                     let samples = E::SAMPLES * (inside[0] * inside[1]) as u64;
                     loss = loss.plus(Loss { largest: largest.into(), squares: squares.into(), samples });
                 }
@@ -243,27 +243,21 @@ fn sum_of_blocks<E: Errors>(volume: &Volume<'_>, errors: &E, block_bytes: usize,
     sums.into_iter().fold(NONE, Loss::plus)
 }
 
-/// The error of block `i` of a strip, over the voxels that are inside.
-fn of_block<E: Errors>(strip: &Strip, i: usize, [x, y]: [usize; 2], errors: &E, block: &[u8]) -> Sum {
-    let mut sum = [0.0; 2];
-    match errors.constant(strip.range(i), block) {
-        Some(None) => {}
+/// The error of a block, over the voxels that are inside.
+fn of_block<E: Errors>(indices: &[u16; VOXELS], [x, y]: [usize; 2], errors: &E, block: &[u8]) -> Sum {
+    let lines = indices.chunks_exact(EDGE).take(y);
+    match errors.constant(least_and_most(indices), block) {
+        Some(None) => [0.0; 2],
         Some(Some(by_index)) => {
-            for j in 0..y {
-                let indices = &strip.block_row(i, j)[..x];
-                sum = indices.iter().fold(sum, |sum, index| add(sum, by_index[usize::from(*index)]));
-            }
+            lines.flat_map(|line| &line[..x]).fold([0.0; 2], |sum, i| add(sum, by_index[usize::from(*i)]))
         }
         None => {
             let texels = errors.decode(block);
-            for (j, texels) in texels.chunks_exact(EDGE).take(y).enumerate() {
-                for (index, texel) in strip.block_row(i, j).iter().zip(texels).take(x) {
-                    sum = add(sum, errors.error(*index, *texel));
-                }
-            }
+            let lines = lines.zip(texels.chunks_exact(EDGE));
+            let voxels = lines.flat_map(|(line, texels)| line.iter().zip(texels).take(x));
+            voxels.fold([0.0; 2], |sum, (index, texel)| add(sum, errors.error(*index, *texel)))
         }
     }
-    sum
 }
 
 /// Of texels the error follows from the index alone: it is enough to count those.

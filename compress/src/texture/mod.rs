@@ -27,6 +27,7 @@ mod curve;
 mod domain;
 mod encode;
 mod loss;
+mod rows;
 mod table;
 mod texels;
 mod volume;
@@ -373,11 +374,25 @@ impl<'a> Source<'a> {
     ) -> Result<EncodeStats, TextureError> {
         check_len(out, part.blocks() * format.block_bytes())?;
         self.check_mapping(format)?;
+        let signed = self.volume.kind() == SampleKind::I16;
         let job = Job { volume: self.volume, part, skip: self.skip.as_ref(), options, simd: self.simd };
         Ok(match (format, self.mapping) {
-            (BlockFormat::Bc1, Mapping::Colours(table)) => encode::colours::<8>(&job, table, format, out),
-            (BlockFormat::Bc3, Mapping::Colours(table)) => encode::colours::<16>(&job, table, format, out),
-            (BlockFormat::Bc4, Mapping::Scalars(window)) => encode::scalars(&job, window, out),
+            (BlockFormat::Bc4, Mapping::Scalars(window)) if signed => {
+                encode::scalars::<i16>(&job, window, out)
+            }
+            (BlockFormat::Bc4, Mapping::Scalars(window)) => encode::scalars::<u16>(&job, window, out),
+            (BlockFormat::Bc1, Mapping::Colours(table)) if signed => {
+                encode::colours::<i16, 8>(&job, table, format, out)
+            }
+            (BlockFormat::Bc1, Mapping::Colours(table)) => {
+                encode::colours::<u16, 8>(&job, table, format, out)
+            }
+            (BlockFormat::Bc3, Mapping::Colours(table)) if signed => {
+                encode::colours::<i16, 16>(&job, table, format, out)
+            }
+            (BlockFormat::Bc3, Mapping::Colours(table)) => {
+                encode::colours::<u16, 16>(&job, table, format, out)
+            }
             _ => return Err(TextureError::Mapping),
         })
     }

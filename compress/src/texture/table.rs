@@ -182,6 +182,12 @@ impl ColourTable {
         &self.colours
     }
 
+    /// The constant block of a run.
+    #[inline(always)]
+    pub(super) fn constant(&self, run: u16) -> &Constant {
+        &self.constants[usize::from(run)]
+    }
+
     /// The constant block of each run.
     pub(super) fn constants(&self) -> &[Constant] {
         &self.constants
