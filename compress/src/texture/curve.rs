@@ -23,10 +23,8 @@ type PerBlock<T> = [T; BATCH];
 /// Blocks that wait to be encoded. Voxel by voxel, so that a loop over the blocks does the same in each.
 #[derive(Debug)]
 pub(super) struct Batch {
-    /// The opacity of each voxel; 1/65535.
-    opacities: [PerBlock<u16>; VOXELS],
-    /// The way along of each voxel.
-    ways: [PerBlock<u16>; VOXELS],
+    /// The place of each voxel: opacity in the low half, the way along in the high half.
+    places: [PerBlock<u32>; VOXELS],
     /// The ways along of the ends of the block's part of the curve, and the colours there.
     from: PerBlock<u16>,
     to: PerBlock<u16>,
@@ -40,8 +38,7 @@ pub(super) struct Batch {
 impl Batch {
     pub(super) fn new() -> Self {
         Self {
-            opacities: [[0; BATCH]; VOXELS],
-            ways: [[0; BATCH]; VOXELS],
+            places: [[0; BATCH]; VOXELS],
             from: [0; BATCH],
             to: [0; BATCH],
             ends: [[[0; 4]; 2]; BATCH],
@@ -62,9 +59,7 @@ impl Batch {
     ) -> bool {
         let (places, b) = (table.places(), self.len & (BATCH - 1));
         for (i, index) in indices.iter().enumerate() {
-            let place = places[usize::from(*index)];
-            self.opacities[i][b] = place as u16;
-            self.ways[i][b] = (place >> 16) as u16;
+            self.places[i][b] = places[usize::from(*index)];
         }
         self.from[b] = (places[usize::from(low)] >> 16) as u16;
         self.to[b] = (places[usize::from(high)] >> 16) as u16;
@@ -107,10 +102,10 @@ impl Batch {
         }
         // Two bits a voxel, eight voxels a number.
         let mut thirds = [[0_u16; BATCH]; 2];
-        for (i, ways) in self.ways.iter().enumerate() {
+        for (i, places) in self.places.iter().enumerate() {
             let (thirds, shift) = (&mut thirds[i / 8], 2 * (i as u16 % 8));
             for b in 0..lanes {
-                let way = self.to[b].wrapping_sub(ways[b]);
+                let way = self.to[b].wrapping_sub((places[b] >> 16) as u16);
                 let third = u16::from(way > halfway[0][b])
                     + u16::from(way > halfway[1][b])
                     + u16::from(way > halfway[2][b]);
@@ -136,11 +131,14 @@ impl Batch {
     /// The blocks of opacities.
     #[inline(always)]
     fn opacities(&self, lanes: usize) -> PerBlock<u64> {
-        let (mut low, mut high) = (self.opacities[0], self.opacities[0]);
-        for opacities in &self.opacities[1..] {
+        let mut opacities = [[0; BATCH]; VOXELS];
+        let (mut low, mut high) = ([u16::MAX; BATCH], [0; BATCH]);
+        for (places, opacities) in self.places.iter().zip(&mut opacities) {
             for b in 0..lanes {
-                low[b] = low[b].min(opacities[b]);
-                high[b] = high[b].max(opacities[b]);
+                let opacity = places[b] as u16;
+                opacities[b] = opacity;
+                low[b] = low[b].min(opacity);
+                high[b] = high[b].max(opacity);
             }
         }
         let mut scales = [[0_u16; BATCH]; 4];
@@ -156,7 +154,7 @@ impl Batch {
         let [top, span, unit, factor] = &scales;
         // Three bits a voxel, four voxels a number.
         let mut sevenths = [[0_u16; BATCH]; 4];
-        for (i, opacities) in self.opacities.iter().enumerate() {
+        for (i, opacities) in opacities.iter().enumerate() {
             let (sevenths, shift) = (&mut sevenths[i / 4], 3 * (i as u16 % 4));
             for b in 0..lanes {
                 let from_top = top[b].saturating_sub(opacities[b]).min(span[b]).wrapping_mul(unit[b]);

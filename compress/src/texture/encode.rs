@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::bricks::SkipMap;
 use super::curve;
 use super::table::ColourTable;
-use super::rows::{Cell, EDGE, Rows, VOXELS, indices, least_and_most, range};
+use super::rows::{Cell, EDGE, GROUP, Rows, VOXELS, WIDE, columns, indices, outer};
 use super::volume::Volume;
 use super::window::Window;
 use super::{EncodeStats, Part};
@@ -25,9 +25,6 @@ const TASK_BLOCKS: usize = 2048;
 
 /// Blocks that are handed to a kernel together.
 const BATCH: usize = curve::BATCH;
-
-/// Blocks that are looked at together, to find that they are one constant.
-const GROUP: usize = 8;
 
 /// Blocks of texels that wait to be encoded; `N` bytes a texel.
 #[derive(Debug)]
@@ -256,53 +253,75 @@ impl<T: Cell, const BYTES: usize> ColourTask<'_, T, BYTES> {
     /// Encodes the blocks of four rows, from block `at` of the output on.
     #[inline(always)]
     fn span(&mut self, [a, b, c, d]: [&[T]; EDGE], at: usize) {
-        const WIDE: usize = GROUP * EDGE;
         let (wide_a, rest_a) = a.as_chunks::<WIDE>();
         let (wide_b, rest_b) = b.as_chunks::<WIDE>();
         let (wide_c, rest_c) = c.as_chunks::<WIDE>();
         let (wide_d, rest_d) = d.as_chunks::<WIDE>();
         for (group, (((a, b), c), d)) in wide_a.iter().zip(wide_b).zip(wide_c).zip(wide_d).enumerate() {
-            let at = at + group * GROUP;
-            let [least, most] = range([a, b, c, d]);
-            match self.table.run([least.index(self.bounds), most.index(self.bounds)]) {
-                Some(run) => self.constants(run, at, GROUP),
-                None => self.each([a, b, c, d], at),
-            }
+            self.group([a, b, c, d], at + group * GROUP, GROUP);
         }
-        self.each([rest_a, rest_b, rest_c, rest_d], at + wide_a.len() * GROUP);
+        if !rest_a.is_empty() {
+            // A last group that is not whole is filled up with its last voxel, and only its own blocks are kept.
+            let mut rows = [[T::default(); WIDE]; EDGE];
+            for (row, rest) in rows.iter_mut().zip([rest_a, rest_b, rest_c, rest_d]) {
+                row[..rest.len()].copy_from_slice(rest);
+                row[rest.len()..].fill(rest.last().copied().unwrap_or_default());
+            }
+            let at = at + wide_a.len() * GROUP;
+            self.group([&rows[0], &rows[1], &rows[2], &rows[3]], at, rest_a.len() / EDGE);
+        }
     }
 
-    /// Writes constants of one run.
+    /// Encodes the first `count` blocks of a group, from block `at` of the output on.
     #[inline(always)]
-    fn constants(&mut self, run: u16, at: usize, count: usize) {
-        let constant = self.table.constant(run);
-        self.blocks[at..at + count].fill(constant.block());
-        *(if constant.clear { &mut self.stats.clear } else { &mut self.stats.solid }) += count as u64;
+    fn group(&mut self, rows: [&[T; WIDE]; EDGE], at: usize, count: usize) {
+        let [least, most] = columns(rows);
+        let [low, high] = outer([&least, &most]);
+        if let Some(run) = self.table.run([low.index(self.bounds), high.index(self.bounds)]) {
+            let constant = self.table.constant(run);
+            self.blocks[at..at + count].fill(constant.block());
+            *(if constant.clear { &mut self.stats.clear } else { &mut self.stats.solid }) += count as u64;
+            return;
+        }
+        // Without branches, since here nothing is likely: each block becomes a constant, and those that are none are
+        // listed to be written again.
+        let (least, most) = (least.as_chunks::<EDGE>().0, most.as_chunks::<EDGE>().0);
+        let mut mixed = [(0_u8, [0_u16; 2]); GROUP + 1];
+        let mut mixed_count = 0;
+        for (i, block) in self.blocks[at..at + count].iter_mut().enumerate() {
+            let [low, high] = outer([&least[i], &most[i]]);
+            let (low, high) = (low.index(self.bounds), high.index(self.bounds));
+            let runs = self.table.runs();
+            let (run, last) = (runs[usize::from(low)], runs[usize::from(high)]);
+            let (constant, is_constant) = (self.table.constant(run), run == last);
+            *block = constant.block();
+            self.stats.clear += u64::from(is_constant & constant.clear);
+            self.stats.solid += u64::from(is_constant & !constant.clear);
+            mixed[mixed_count] = (i as u8, [low, high]);
+            mixed_count += usize::from(!is_constant);
+        }
+        for (i, range) in &mixed[..mixed_count] {
+            let i = usize::from(*i) & (GROUP - 1);
+            self.mixed(rows, i, *range, at + i);
+        }
     }
 
-    /// Encodes the blocks of four rows one by one.
+    /// Encodes block `i` of a group, of more than one look, as block `at` of the output.
     #[inline(always)]
-    fn each(&mut self, [a, b, c, d]: [&[T]; EDGE], at: usize) {
-        let [(a, _), (b, _), (c, _), (d, _)] =
-            [a.as_chunks::<EDGE>(), b.as_chunks::<EDGE>(), c.as_chunks::<EDGE>(), d.as_chunks::<EDGE>()];
-        for (i, (((a, b), c), d)) in a.iter().zip(b).zip(c).zip(d).enumerate() {
-            let indices = indices([a, b, c, d], self.bounds);
-            let range = least_and_most(&indices);
-            if let Some(run) = self.table.run(range) {
-                self.constants(run, at + i, 1);
-            } else if self.options.level == Level::Fast && self.table.is_straight(range) {
-                self.stats.curve += 1;
-                if self.curve.push(&indices, range, self.table, at + i) {
-                    self.curve.flush(self.blocks);
-                }
-            } else {
-                let mut texels = [[0; 4]; VOXELS];
-                for (texel, index) in texels.iter_mut().zip(indices) {
-                    *texel = self.table.texels()[usize::from(index)];
-                }
-                if self.colours.push(&texels, at + i) {
-                    self.flush_colours();
-                }
+    fn mixed(&mut self, rows: [&[T; WIDE]; EDGE], i: usize, range: [u16; 2], at: usize) {
+        let indices = indices(rows, i, self.bounds);
+        if self.options.level == Level::Fast && self.table.is_straight(range) {
+            self.stats.curve += 1;
+            if self.curve.push(&indices, range, self.table, at) {
+                self.curve.flush(self.blocks);
+            }
+        } else {
+            let mut texels = [[0; 4]; VOXELS];
+            for (texel, index) in texels.iter_mut().zip(indices) {
+                *texel = self.table.texels()[usize::from(index)];
+            }
+            if self.colours.push(&texels, at) {
+                self.flush_colours();
             }
         }
     }
@@ -392,16 +411,19 @@ impl<T: Cell> ScalarTask<'_, T> {
         let [(a, _), (b, _), (c, _), (d, _)] =
             [a.as_chunks::<EDGE>(), b.as_chunks::<EDGE>(), c.as_chunks::<EDGE>(), d.as_chunks::<EDGE>()];
         for (i, (((a, b), c), d)) in a.iter().zip(b).zip(c).zip(d).enumerate() {
-            let indices = indices([a, b, c, d], self.bounds);
+            let indices = indices([a, b, c, d], 0, self.bounds);
+            let [low, high] = outer([&indices, &indices]);
+            let [low, high] = [self.window.texel(low), self.window.texel(high)];
+            if low == high {
+                self.blocks[at + i] = solid(low);
+                self.stats.solid += 1;
+                continue;
+            }
             let mut texels = [[0; 1]; VOXELS];
             for (texel, index) in texels.iter_mut().zip(indices) {
                 *texel = [self.window.texel(index)];
             }
-            let [low, high] = least_and_most(&texels);
-            if low == high {
-                self.blocks[at + i] = solid(low[0]);
-                self.stats.solid += 1;
-            } else if self.scalars.push(&texels, at + i) {
+            if self.scalars.push(&texels, at + i) {
                 self.flush();
             }
         }

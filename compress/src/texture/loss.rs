@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Mapping;
 use super::domain::{Domain, SampleKind};
-use super::rows::{Cell, EDGE, Rows, VOXELS, indices, least_and_most};
+use super::rows::{Cell, EDGE, Rows, VOXELS, indices, outer};
 use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
@@ -230,7 +230,7 @@ fn sum_of_blocks<E: Errors>(volume: &Volume<'_>, errors: &E, block_bytes: usize,
                 for (i, bytes) in blocks.chunks_exact(block_bytes).enumerate() {
                     // Voxels past the edges are not there to be wrong.
                     let inside = [(extent.x() - EDGE * i).min(EDGE), (extent.y() - EDGE * y).min(EDGE)];
-                    let indices = indices([&a[i], &b[i], &c[i], &d[i]], bounds);
+                    let indices = indices([&a[i], &b[i], &c[i], &d[i]], 0, bounds);
                     let [squares, largest] = of_block(&indices, inside, errors, bytes);
                     let samples = E::SAMPLES * (inside[0] * inside[1]) as u64;
                     loss = loss.plus(Loss { largest: largest.into(), squares: squares.into(), samples });
@@ -246,7 +246,7 @@ fn sum_of_blocks<E: Errors>(volume: &Volume<'_>, errors: &E, block_bytes: usize,
 /// The error of a block, over the voxels that are inside.
 fn of_block<E: Errors>(indices: &[u16; VOXELS], [x, y]: [usize; 2], errors: &E, block: &[u8]) -> Sum {
     let lines = indices.chunks_exact(EDGE).take(y);
-    match errors.constant(least_and_most(indices), block) {
+    match errors.constant(outer([indices, indices]), block) {
         Some(None) => [0.0; 2],
         Some(Some(by_index)) => {
             lines.flat_map(|line| &line[..x]).fold([0.0; 2], |sum, i| add(sum, by_index[usize::from(*i)]))

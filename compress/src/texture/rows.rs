@@ -105,14 +105,26 @@ impl<T: Cell> Rows<T> {
     }
 }
 
-/// The least and the greatest of some voxels of four rows.
+/// Blocks that are looked at together.
+pub(super) const GROUP: usize = 8;
+
+/// Voxels of a row of a group.
+pub(super) const WIDE: usize = GROUP * EDGE;
+
+/// The least and the greatest voxel of each column of four rows.
 #[inline(always)]
-pub(super) fn range<T: Cell, const N: usize>([a, b, c, d]: [&[T; N]; EDGE]) -> [T; 2] {
+pub(super) fn columns<T: Cell, const N: usize>([a, b, c, d]: [&[T; N]; EDGE]) -> [[T; N]; 2] {
     let (mut least, mut most) = (*a, *a);
     for i in 0..N {
         least[i] = a[i].min(b[i]).min(c[i].min(d[i]));
         most[i] = a[i].max(b[i]).max(c[i].max(d[i]));
     }
+    [least, most]
+}
+
+/// The least of the first, and the greatest of the second.
+#[inline(always)]
+pub(super) fn outer<T: Copy + Ord, const N: usize>([least, most]: [&[T; N]; 2]) -> [T; 2] {
     let (mut low, mut high) = (least[0], most[0]);
     for i in 1..N {
         low = low.min(least[i]);
@@ -121,31 +133,18 @@ pub(super) fn range<T: Cell, const N: usize>([a, b, c, d]: [&[T; N]; EDGE]) -> [
     [low, high]
 }
 
-/// The least and the greatest of a block.
+/// The table indices of block `i` of some rows, x fastest.
 #[inline(always)]
-pub(super) fn least_and_most<T: Copy + Ord>(voxels: &[T; VOXELS]) -> [T; 2] {
-    [reduced(*voxels, Ord::min), reduced(*voxels, Ord::max)]
-}
-
-/// All values, the first half with the second, until one is left; `N` is a power of two.
-#[inline(always)]
-fn reduced<T: Copy, const N: usize>(mut values: [T; N], of_two: impl Fn(T, T) -> T) -> T {
-    let mut half = N / 2;
-    while half > 0 {
-        for i in 0..half {
-            values[i] = of_two(values[i], values[half + i]);
-        }
-        half /= 2;
-    }
-    values[0]
-}
-
-/// The table indices of a block, x fastest.
-#[inline(always)]
-pub(super) fn indices<T: Cell>(rows: [&[T; EDGE]; EDGE], bounds: [T; 2]) -> [u16; VOXELS] {
+pub(super) fn indices<T: Cell, const N: usize>(
+    [a, b, c, d]: [&[T; N]; EDGE],
+    i: usize,
+    bounds: [T; 2],
+) -> [u16; VOXELS] {
     let mut indices = [0; VOXELS];
-    for (i, index) in indices.iter_mut().enumerate() {
-        *index = rows[i / EDGE][i % EDGE].index(bounds);
+    for (row, indices) in [a, b, c, d].into_iter().zip(indices.as_chunks_mut::<EDGE>().0) {
+        for (index, voxel) in indices.iter_mut().zip(&row[i * EDGE..][..EDGE]) {
+            *index = voxel.index(bounds);
+        }
     }
     indices
 }

@@ -182,6 +182,12 @@ impl ColourTable {
         &self.colours
     }
 
+    /// The run of each index.
+    #[inline(always)]
+    pub(super) fn runs(&self) -> &[u16; ENTRIES] {
+        &self.runs
+    }
+
     /// The constant block of a run.
     #[inline(always)]
     pub(super) fn constant(&self, run: u16) -> &Constant {
