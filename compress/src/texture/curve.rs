@@ -8,8 +8,9 @@
 //! Plain loops over arrays of whole numbers, one operation of one width at a time, so that they are vectorised where
 //! this is inlined; the results are exact, so the bytes do not depend on the instructions used.
 
-use super::rows::VOXELS;
+use super::rows::{EDGE, Group, VOXELS};
 use super::table::ColourTable;
+use crate::simd::Simd;
 
 /// Blocks encoded together.
 pub(super) const BATCH: usize = 64;
@@ -47,19 +48,22 @@ impl Batch {
         }
     }
 
-    /// Adds a block of table indices between those of `range`, as block `at` of the output; says whether the batch is
-    /// full.
+    /// Adds block `i` of a group, whose indices are in `[low, high]`, as block `at` of the output; says whether the
+    /// batch is full.
     #[inline(always)]
     pub(super) fn push(
         &mut self,
-        indices: &[u16; VOXELS],
+        group: Group<'_>,
+        i: usize,
         [low, high]: [u16; 2],
         table: &ColourTable,
         at: usize,
     ) -> bool {
         let (places, b) = (table.places(), self.len & (BATCH - 1));
-        for (i, index) in indices.iter().enumerate() {
-            self.places[i][b] = places[usize::from(*index)];
+        for (j, places_of_row) in self.places.as_chunks_mut::<EDGE>().0.iter_mut().enumerate() {
+            for (index, place) in group.block_row(i, j).iter().zip(places_of_row) {
+                place[b] = places[usize::from(*index)];
+            }
         }
         self.from[b] = (places[usize::from(low)] >> 16) as u16;
         self.to[b] = (places[usize::from(high)] >> 16) as u16;
@@ -70,8 +74,29 @@ impl Batch {
     }
 
     /// Encodes what waits into its places in `blocks`: BC3, or BC1 if a block has 8 bytes.
+    pub(super) fn flush<const BYTES: usize>(&mut self, blocks: &mut [[u8; BYTES]], simd: Simd) {
+        match simd {
+            Simd::Plain => self.encode(blocks),
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx2(_) => {
+                #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
+                // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
+                unsafe {
+                    self.encode_avx2(blocks);
+                }
+            }
+        }
+        self.len = 0;
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+    fn encode_avx2<const BYTES: usize>(&self, blocks: &mut [[u8; BYTES]]) {
+        self.encode(blocks);
+    }
+
     #[inline(always)]
-    pub(super) fn flush<const BYTES: usize>(&mut self, blocks: &mut [[u8; BYTES]]) {
+    fn encode<const BYTES: usize>(&self, blocks: &mut [[u8; BYTES]]) {
         if self.len == 0 {
             return;
         }
@@ -86,7 +111,6 @@ impl Batch {
                 blocks[at as usize][..8].copy_from_slice(&block.to_le_bytes());
             }
         }
-        self.len = 0;
     }
 
     /// The blocks of colours between the ends.

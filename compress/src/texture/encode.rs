@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::bricks::SkipMap;
 use super::curve;
 use super::table::ColourTable;
-use super::rows::{Cell, EDGE, GROUP, Rows, VOXELS, WIDE, columns, indices, outer};
+use super::rows::{EDGE, GROUP, Group, Ranges, Rows};
 use super::volume::Volume;
 use super::window::Window;
 use super::{EncodeStats, Part};
@@ -41,11 +41,14 @@ impl<const N: usize> TexelBatch<N> {
         Self { rows: [[[0; N]; BATCH * EDGE]; EDGE], at: [0; BATCH], len: 0 }
     }
 
-    /// Adds a block, as block `at` of the output; says whether the batch is full.
+    /// Adds block `i` of a group, as block `at` of the output; says whether the batch is full.
     #[inline(always)]
-    fn push(&mut self, texels: &[[u8; N]; VOXELS], at: usize) -> bool {
-        for (row, texels) in self.rows.iter_mut().zip(texels.as_chunks::<EDGE>().0) {
-            row[self.len * EDGE..][..EDGE].copy_from_slice(texels);
+    fn push(&mut self, group: Group<'_>, i: usize, at: usize, texel: impl Fn(u16) -> [u8; N]) -> bool {
+        for (j, row) in self.rows.iter_mut().enumerate() {
+            let texels = &mut row[self.len * EDGE..][..EDGE];
+            for (out, index) in texels.iter_mut().zip(group.block_row(i, j)) {
+                *out = texel(*index);
+            }
         }
         self.at[self.len] = at as u32;
         self.len += 1;
@@ -73,8 +76,8 @@ impl<const N: usize> TexelBatch<N> {
 
 /// What one thread works with.
 #[derive(Debug)]
-struct Scratch<T> {
-    rows: Rows<T>,
+struct Scratch {
+    rows: Rows,
     curve: Box<curve::Batch>,
     colours: Box<TexelBatch<4>>,
     scalars: Box<TexelBatch<1>>,
@@ -82,7 +85,7 @@ struct Scratch<T> {
     known: Vec<Option<u16>>,
 }
 
-impl<T: Cell> Scratch<T> {
+impl Scratch {
     fn new(blocks: usize) -> Self {
         Self {
             rows: Rows::new(blocks),
@@ -107,10 +110,10 @@ pub(super) struct Job<'a> {
 impl Job<'_> {
     /// Runs `row` on each row of blocks of the part, in parallel over tasks of some rows. It is given the task's
     /// blocks, where in them its row begins, and the first block of the row in the volume.
-    fn rows<T: Cell, const BYTES: usize>(
+    fn rows<const BYTES: usize>(
         &self,
         blocks: &mut [u8],
-        task: impl Fn(&mut Scratch<T>, &mut [[u8; BYTES]], usize) -> EncodeStats + Sync,
+        task: impl Fn(&mut Scratch, &mut [[u8; BYTES]], usize) -> EncodeStats + Sync,
     ) -> EncodeStats {
         let row = self.part.count[0];
         let rows = (TASK_BLOCKS / row).max(1);
@@ -166,45 +169,21 @@ impl Iterator for Spans<'_> {
 }
 
 /// Encodes the colours of a part as BC3, or as BC1 if a block has 8 bytes.
-pub(super) fn colours<T: Cell, const BYTES: usize>(
+pub(super) fn colours<const BYTES: usize>(
     job: &Job<'_>,
     table: &ColourTable,
     format: BlockFormat,
     blocks: &mut [u8],
 ) -> EncodeStats {
-    job.rows::<T, BYTES>(blocks, |scratch, blocks, first| match job.simd {
-        Simd::Plain => colour_task(job, table, format, scratch, blocks, first),
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(_) => {
-            #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-            // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
-            unsafe {
-                colour_task_avx2(job, table, format, scratch, blocks, first)
-            }
-        }
-    })
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-fn colour_task_avx2<T: Cell, const BYTES: usize>(
-    job: &Job<'_>,
-    table: &ColourTable,
-    format: BlockFormat,
-    scratch: &mut Scratch<T>,
-    blocks: &mut [[u8; BYTES]],
-    first: usize,
-) -> EncodeStats {
-    colour_task(job, table, format, scratch, blocks, first)
+    job.rows::<BYTES>(blocks, |scratch, blocks, first| colour_task(job, table, format, scratch, blocks, first))
 }
 
 /// Encodes some rows of blocks, `first` of the part and those after it.
-#[inline(always)]
-fn colour_task<T: Cell, const BYTES: usize>(
+fn colour_task<const BYTES: usize>(
     job: &Job<'_>,
     table: &ColourTable,
     format: BlockFormat,
-    scratch: &mut Scratch<T>,
+    scratch: &mut Scratch,
     blocks: &mut [[u8; BYTES]],
     first: usize,
 ) -> EncodeStats {
@@ -212,7 +191,7 @@ fn colour_task<T: Cell, const BYTES: usize>(
         table,
         format,
         options: job.options,
-        bounds: T::bounds(table.domain()),
+        simd: job.simd,
         curve: &mut scratch.curve,
         colours: &mut scratch.colours,
         blocks,
@@ -227,57 +206,38 @@ fn colour_task<T: Cell, const BYTES: usize>(
                 task.blocks[at..at + span.len()].fill(table.constant(run).block());
                 task.stats.skipped += span.len() as u64;
             } else {
-                let rows = scratch.rows.of(&job.volume, table.domain(), [x + span.start, y, z], span.len());
-                task.span(rows, at);
+                let from = [x + span.start, y, z];
+                scratch.rows.read(&job.volume, table.domain(), from, span.len(), job.simd);
+                for first in (0..span.len()).step_by(GROUP) {
+                    let count = GROUP.min(span.len() - first);
+                    task.group(scratch.rows.group(first / GROUP), at + first, count);
+                }
             }
         }
     }
-    task.curve.flush(task.blocks);
+    task.curve.flush(task.blocks, task.simd);
     task.flush_colours();
     EncodeStats { blocks: task.blocks.len() as u64, ..task.stats }
 }
 
 /// Some rows of blocks of colours on the way.
-struct ColourTask<'a, T, const BYTES: usize> {
+struct ColourTask<'a, const BYTES: usize> {
     table: &'a ColourTable,
     format: BlockFormat,
     options: EncodeOptions,
-    bounds: [T; 2],
+    simd: Simd,
     curve: &'a mut curve::Batch,
     colours: &'a mut TexelBatch<4>,
     blocks: &'a mut [[u8; BYTES]],
     stats: EncodeStats,
 }
 
-impl<T: Cell, const BYTES: usize> ColourTask<'_, T, BYTES> {
-    /// Encodes the blocks of four rows, from block `at` of the output on.
-    #[inline(always)]
-    fn span(&mut self, [a, b, c, d]: [&[T]; EDGE], at: usize) {
-        let (wide_a, rest_a) = a.as_chunks::<WIDE>();
-        let (wide_b, rest_b) = b.as_chunks::<WIDE>();
-        let (wide_c, rest_c) = c.as_chunks::<WIDE>();
-        let (wide_d, rest_d) = d.as_chunks::<WIDE>();
-        for (group, (((a, b), c), d)) in wide_a.iter().zip(wide_b).zip(wide_c).zip(wide_d).enumerate() {
-            self.group([a, b, c, d], at + group * GROUP, GROUP);
-        }
-        if !rest_a.is_empty() {
-            // A last group that is not whole is filled up with its last voxel, and only its own blocks are kept.
-            let mut rows = [[T::default(); WIDE]; EDGE];
-            for (row, rest) in rows.iter_mut().zip([rest_a, rest_b, rest_c, rest_d]) {
-                row[..rest.len()].copy_from_slice(rest);
-                row[rest.len()..].fill(rest.last().copied().unwrap_or_default());
-            }
-            let at = at + wide_a.len() * GROUP;
-            self.group([&rows[0], &rows[1], &rows[2], &rows[3]], at, rest_a.len() / EDGE);
-        }
-    }
-
+impl<const BYTES: usize> ColourTask<'_, BYTES> {
     /// Encodes the first `count` blocks of a group, from block `at` of the output on.
     #[inline(always)]
-    fn group(&mut self, rows: [&[T; WIDE]; EDGE], at: usize, count: usize) {
-        let [least, most] = columns(rows);
-        let [low, high] = outer([&least, &most]);
-        if let Some(run) = self.table.run([low.index(self.bounds), high.index(self.bounds)]) {
+    fn group(&mut self, group: Group<'_>, at: usize, count: usize) {
+        let Ranges { low, high, all } = group.ranges;
+        if let Some(run) = self.table.run(*all) {
             let constant = self.table.constant(run);
             self.blocks[at..at + count].fill(constant.block());
             *(if constant.clear { &mut self.stats.clear } else { &mut self.stats.solid }) += count as u64;
@@ -285,44 +245,34 @@ impl<T: Cell, const BYTES: usize> ColourTask<'_, T, BYTES> {
         }
         // Without branches, since here nothing is likely: each block becomes a constant, and those that are none are
         // listed to be written again.
-        let (least, most) = (least.as_chunks::<EDGE>().0, most.as_chunks::<EDGE>().0);
-        let mut mixed = [(0_u8, [0_u16; 2]); GROUP + 1];
+        let mut mixed = [0; GROUP + 1];
         let mut mixed_count = 0;
         for (i, block) in self.blocks[at..at + count].iter_mut().enumerate() {
-            let [low, high] = outer([&least[i], &most[i]]);
-            let (low, high) = (low.index(self.bounds), high.index(self.bounds));
             let runs = self.table.runs();
-            let (run, last) = (runs[usize::from(low)], runs[usize::from(high)]);
+            let (run, last) = (runs[usize::from(low[i])], runs[usize::from(high[i])]);
             let (constant, is_constant) = (self.table.constant(run), run == last);
             *block = constant.block();
             self.stats.clear += u64::from(is_constant & constant.clear);
             self.stats.solid += u64::from(is_constant & !constant.clear);
-            mixed[mixed_count] = (i as u8, [low, high]);
+            mixed[mixed_count] = i;
             mixed_count += usize::from(!is_constant);
         }
-        for (i, range) in &mixed[..mixed_count] {
-            let i = usize::from(*i) & (GROUP - 1);
-            self.mixed(rows, i, *range, at + i);
+        for i in &mixed[..mixed_count] {
+            let i = i & (GROUP - 1);
+            self.mixed(group, i, [low[i], high[i]], at + i);
         }
     }
 
     /// Encodes block `i` of a group, of more than one look, as block `at` of the output.
     #[inline(always)]
-    fn mixed(&mut self, rows: [&[T; WIDE]; EDGE], i: usize, range: [u16; 2], at: usize) {
-        let indices = indices(rows, i, self.bounds);
+    fn mixed(&mut self, group: Group<'_>, i: usize, range: [u16; 2], at: usize) {
         if self.options.level == Level::Fast && self.table.is_straight(range) {
             self.stats.curve += 1;
-            if self.curve.push(&indices, range, self.table, at) {
-                self.curve.flush(self.blocks);
+            if self.curve.push(group, i, range, self.table, at) {
+                self.curve.flush(self.blocks, self.simd);
             }
-        } else {
-            let mut texels = [[0; 4]; VOXELS];
-            for (texel, index) in texels.iter_mut().zip(indices) {
-                *texel = self.table.texels()[usize::from(index)];
-            }
-            if self.colours.push(&texels, at) {
-                self.flush_colours();
-            }
+        } else if self.colours.push(group, i, at, |index| self.table.texels()[usize::from(index)]) {
+            self.flush_colours();
         }
     }
 
@@ -333,45 +283,21 @@ impl<T: Cell, const BYTES: usize> ColourTask<'_, T, BYTES> {
 }
 
 /// Encodes the scalars of a part as BC4.
-pub(super) fn scalars<T: Cell>(job: &Job<'_>, window: &Window, blocks: &mut [u8]) -> EncodeStats {
-    job.rows::<T, 8>(blocks, |scratch, blocks, first| match job.simd {
-        Simd::Plain => scalar_task(job, window, scratch, blocks, first),
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(_) => {
-            #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-            // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
-            unsafe {
-                scalar_task_avx2(job, window, scratch, blocks, first)
-            }
-        }
-    })
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-fn scalar_task_avx2<T: Cell>(
-    job: &Job<'_>,
-    window: &Window,
-    scratch: &mut Scratch<T>,
-    blocks: &mut [[u8; 8]],
-    first: usize,
-) -> EncodeStats {
-    scalar_task(job, window, scratch, blocks, first)
+pub(super) fn scalars(job: &Job<'_>, window: &Window, blocks: &mut [u8]) -> EncodeStats {
+    job.rows::<8>(blocks, |scratch, blocks, first| scalar_task(job, window, scratch, blocks, first))
 }
 
 /// Encodes some rows of blocks, `first` of the part and those after it.
-#[inline(always)]
-fn scalar_task<T: Cell>(
+fn scalar_task(
     job: &Job<'_>,
     window: &Window,
-    scratch: &mut Scratch<T>,
+    scratch: &mut Scratch,
     blocks: &mut [[u8; 8]],
     first: usize,
 ) -> EncodeStats {
     let mut task = ScalarTask {
         window,
         options: job.options,
-        bounds: T::bounds(window.domain()),
         scalars: &mut scratch.scalars,
         blocks,
         stats: EncodeStats::default(),
@@ -385,8 +311,12 @@ fn scalar_task<T: Cell>(
                 task.blocks[at..at + span.len()].fill(solid(texel as u8));
                 task.stats.skipped += span.len() as u64;
             } else {
-                let rows = scratch.rows.of(&job.volume, window.domain(), [x + span.start, y, z], span.len());
-                task.span(rows, at);
+                let from = [x + span.start, y, z];
+                scratch.rows.read(&job.volume, window.domain(), from, span.len(), job.simd);
+                for first in (0..span.len()).step_by(GROUP) {
+                    let count = GROUP.min(span.len() - first);
+                    task.group(scratch.rows.group(first / GROUP), at + first, count);
+                }
             }
         }
     }
@@ -395,35 +325,25 @@ fn scalar_task<T: Cell>(
 }
 
 /// Some rows of blocks of scalars on the way.
-struct ScalarTask<'a, T> {
+struct ScalarTask<'a> {
     window: &'a Window,
     options: EncodeOptions,
-    bounds: [T; 2],
     scalars: &'a mut TexelBatch<1>,
     blocks: &'a mut [[u8; 8]],
     stats: EncodeStats,
 }
 
-impl<T: Cell> ScalarTask<'_, T> {
-    /// Encodes the blocks of four rows, from block `at` of the output on.
+impl ScalarTask<'_> {
+    /// Encodes the first `count` blocks of a group, from block `at` of the output on.
     #[inline(always)]
-    fn span(&mut self, [a, b, c, d]: [&[T]; EDGE], at: usize) {
-        let [(a, _), (b, _), (c, _), (d, _)] =
-            [a.as_chunks::<EDGE>(), b.as_chunks::<EDGE>(), c.as_chunks::<EDGE>(), d.as_chunks::<EDGE>()];
-        for (i, (((a, b), c), d)) in a.iter().zip(b).zip(c).zip(d).enumerate() {
-            let indices = indices([a, b, c, d], 0, self.bounds);
-            let [low, high] = outer([&indices, &indices]);
-            let [low, high] = [self.window.texel(low), self.window.texel(high)];
+    fn group(&mut self, group: Group<'_>, at: usize, count: usize) {
+        let Ranges { low, high, .. } = group.ranges;
+        for (i, at) in (at..at + count).enumerate().take(GROUP) {
+            let [low, high] = [self.window.texel(low[i]), self.window.texel(high[i])];
             if low == high {
-                self.blocks[at + i] = solid(low);
+                self.blocks[at] = solid(low);
                 self.stats.solid += 1;
-                continue;
-            }
-            let mut texels = [[0; 1]; VOXELS];
-            for (texel, index) in texels.iter_mut().zip(indices) {
-                *texel = [self.window.texel(index)];
-            }
-            if self.scalars.push(&texels, at + i) {
+            } else if self.scalars.push(group, i, at, |index| [self.window.texel(index)]) {
                 self.flush();
             }
         }

@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::Mapping;
 use super::domain::{Domain, SampleKind};
-use super::rows::{Cell, EDGE, Rows, VOXELS, indices, outer};
+use super::rows::{EDGE, GROUP, Group, Rows, VOXELS};
+use crate::simd::Simd;
 use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
@@ -176,14 +177,15 @@ pub(super) fn of_blocks(
     volume: &Volume<'_>,
     mapping: Mapping<'_>,
     format: BlockFormat,
+    simd: Simd,
     blocks: &[u8],
 ) -> Loss {
     match mapping {
         Mapping::Colours(table) => {
-            sum_of_blocks(volume, &ColourErrors::new(table, format), format.block_bytes(), blocks)
+            sum_of_blocks(volume, &ColourErrors::new(table, format), simd, format.block_bytes(), blocks)
         }
         Mapping::Scalars(window) => {
-            let loss = sum_of_blocks(volume, &ScalarErrors::new(window), format.block_bytes(), blocks);
+            let loss = sum_of_blocks(volume, &ScalarErrors::new(window), simd, format.block_bytes(), blocks);
             of_steps(loss, window.domain())
         }
     }
@@ -214,24 +216,28 @@ fn of_steps(loss: Loss, domain: &Domain) -> Loss {
     Loss { largest: loss.largest + domain.step() / 2.0, squares, ..loss }
 }
 
-fn sum_of_blocks<E: Errors>(volume: &Volume<'_>, errors: &E, block_bytes: usize, blocks: &[u8]) -> Loss {
+fn sum_of_blocks<E: Errors>(
+    volume: &Volume<'_>,
+    errors: &E,
+    simd: Simd,
+    block_bytes: usize,
+    blocks: &[u8],
+) -> Loss {
     let extent = volume.extent();
     let [width, height, _] = extent.blocks();
-    let bounds = u16::bounds(errors.domain());
     let rows = blocks.par_chunks_exact(width * block_bytes).enumerate();
     let sums: Vec<Loss> = rows
         .map_init(
-            || Rows::<u16>::new(width),
-            |rows, (row, blocks)| {
+            || Rows::new(width),
+            |buffer, (row, blocks)| {
                 let [y, z] = [row % height, row / height];
-                let rows = rows.of(volume, errors.domain(), [0, y, z], width);
+                buffer.read(volume, errors.domain(), [0, y, z], width, simd);
                 let mut loss = NONE;
-                let [a, b, c, d] = rows.map(|row| row.as_chunks::<EDGE>().0);
                 for (i, bytes) in blocks.chunks_exact(block_bytes).enumerate() {
                     // Voxels past the edges are not there to be wrong.
                     let inside = [(extent.x() - EDGE * i).min(EDGE), (extent.y() - EDGE * y).min(EDGE)];
-                    let indices = indices([&a[i], &b[i], &c[i], &d[i]], 0, bounds);
-                    let [squares, largest] = of_block(&indices, inside, errors, bytes);
+                    let group = buffer.group(i / GROUP);
+                    let [squares, largest] = of_block(group, i % GROUP, inside, errors, bytes);
                     let samples = E::SAMPLES * (inside[0] * inside[1]) as u64;
                     loss = loss.plus(Loss { largest: largest.into(), squares: squares.into(), samples });
                 }
@@ -244,9 +250,9 @@ fn sum_of_blocks<E: Errors>(volume: &Volume<'_>, errors: &E, block_bytes: usize,
 }
 
 /// The error of a block, over the voxels that are inside.
-fn of_block<E: Errors>(indices: &[u16; VOXELS], [x, y]: [usize; 2], errors: &E, block: &[u8]) -> Sum {
-    let lines = indices.chunks_exact(EDGE).take(y);
-    match errors.constant(outer([indices, indices]), block) {
+fn of_block<E: Errors>(group: Group<'_>, i: usize, [x, y]: [usize; 2], errors: &E, block: &[u8]) -> Sum {
+    let lines = (0..y).map(|j| group.block_row(i, j));
+    match errors.constant([group.ranges.low[i], group.ranges.high[i]], block) {
         Some(None) => [0.0; 2],
         Some(Some(by_index)) => {
             lines.flat_map(|line| &line[..x]).fold([0.0; 2], |sum, i| add(sum, by_index[usize::from(*i)]))

@@ -347,7 +347,7 @@ impl<'a> Source<'a> {
     pub fn loss_of_blocks(&self, format: BlockFormat, blocks: &[u8]) -> Result<Loss, TextureError> {
         check_len(blocks, format.encoded_len(self.volume.extent()))?;
         self.check_mapping(format)?;
-        Ok(loss::of_blocks(&self.volume, self.mapping, format, blocks))
+        Ok(loss::of_blocks(&self.volume, self.mapping, format, self.simd, blocks))
     }
 
     /// How far the uncompressed texture is from what the samples say: rounding alone, see [`Loss`]. Runs on the
@@ -374,25 +374,11 @@ impl<'a> Source<'a> {
     ) -> Result<EncodeStats, TextureError> {
         check_len(out, part.blocks() * format.block_bytes())?;
         self.check_mapping(format)?;
-        let signed = self.volume.kind() == SampleKind::I16;
         let job = Job { volume: self.volume, part, skip: self.skip.as_ref(), options, simd: self.simd };
         Ok(match (format, self.mapping) {
-            (BlockFormat::Bc4, Mapping::Scalars(window)) if signed => {
-                encode::scalars::<i16>(&job, window, out)
-            }
-            (BlockFormat::Bc4, Mapping::Scalars(window)) => encode::scalars::<u16>(&job, window, out),
-            (BlockFormat::Bc1, Mapping::Colours(table)) if signed => {
-                encode::colours::<i16, 8>(&job, table, format, out)
-            }
-            (BlockFormat::Bc1, Mapping::Colours(table)) => {
-                encode::colours::<u16, 8>(&job, table, format, out)
-            }
-            (BlockFormat::Bc3, Mapping::Colours(table)) if signed => {
-                encode::colours::<i16, 16>(&job, table, format, out)
-            }
-            (BlockFormat::Bc3, Mapping::Colours(table)) => {
-                encode::colours::<u16, 16>(&job, table, format, out)
-            }
+            (BlockFormat::Bc1, Mapping::Colours(table)) => encode::colours::<8>(&job, table, format, out),
+            (BlockFormat::Bc3, Mapping::Colours(table)) => encode::colours::<16>(&job, table, format, out),
+            (BlockFormat::Bc4, Mapping::Scalars(window)) => encode::scalars(&job, window, out),
             _ => return Err(TextureError::Mapping),
         })
     }

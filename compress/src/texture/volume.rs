@@ -100,14 +100,9 @@ impl<'a> Volume<'a> {
         self.low
     }
 
-    /// The samples of the grid.
-    pub(super) fn samples(&self) -> &Samples<'a> {
-        &self.samples
-    }
-
     /// Where voxel `[x, y, z]` of the box is among the samples.
     #[inline(always)]
-    pub(super) fn offset(&self, [x, y, z]: [usize; 3]) -> usize {
+    fn offset(&self, [x, y, z]: [usize; 3]) -> usize {
         let [low_x, low_y, low_z] = self.low;
         ((low_z + z) * self.grid.y() + low_y + y) * self.grid.x() + low_x + x
     }
