@@ -30,5 +30,6 @@ fn main(){
         if a.len()<=4 {
         let b=Instant::now(); src.texels_into(TexelFormat::Rgba8,&mut tex).unwrap(); a2=a2.min(b.elapsed().as_secs_f64());}
     }});
+    let l=src.loss_of_blocks(BlockFormat::Bc3,&out).unwrap(); print!("psnr {:.2} max {:.1} ",l.psnr_db(255.0),l.largest);
     println!("fast {:.3} ms  plain {:.3} ms ratio {:.3} {st:?}",a1*1e3,a2*1e3,a1/a2);
 }

@@ -8,7 +8,7 @@ use crate::{BlockFormat, bc};
 const ENTRIES: usize = 1 << 16;
 
 /// How much of the way along a stretch of the curve its chord must be for the stretch to count as straight.
-const STRAIGHT: f32 = 0.95;
+const STRAIGHT: f32 = 0.7;
 
 /// A stretch of colours so short, in 1/255 of a channel, that its bend is of the size of rounding.
 const SHORT: f32 = 6.0;
