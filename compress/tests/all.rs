@@ -6,3 +6,4 @@ mod bc;
 mod ktx2_file;
 mod naive;
 mod phantom;
+mod texture;

@@ -15,6 +15,7 @@
 //!
 //! Source: KDFS, "S3TC Compressed Texture Image Formats", sections "BC1 with no alpha", "BC1 with alpha".
 
+use super::EncodeOptions;
 use super::block::Texels;
 use super::endpoints::{LineFit, TEXELS, principal_ends, round_to, sum};
 
@@ -50,6 +51,14 @@ struct Fit {
 struct Colours<'a> {
     channels: [[f32; TEXELS]; 3],
     weights: &'a [f32; TEXELS],
+}
+
+/// Encodes a row of blocks: `rows` are four rows of 4·n voxels, `blocks` takes 8·n bytes.
+pub(super) fn encode_row(rows: [&[[u8; 4]]; 4], blocks: &mut [u8], _: EncodeOptions) {
+    for (x, block) in blocks.chunks_exact_mut(8).enumerate() {
+        let texels = std::array::from_fn(|i| rows[i / 4][4 * x + i % 4]);
+        block.copy_from_slice(&encode(&texels));
+    }
 }
 
 /// Encodes one block. Alpha is not kept.

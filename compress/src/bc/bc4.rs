@@ -14,6 +14,7 @@
 //!
 //! Source: KDFS, "RGTC Compressed Texture Image Formats", section "BC4 unsigned".
 
+use super::EncodeOptions;
 use super::block::Texels;
 use super::endpoints::{LineFit, TEXELS, round_to, sum};
 
@@ -62,6 +63,14 @@ struct Fit {
 /// The place of the value 0, and of 255, in a block of [`Kind::Fifths`].
 const PLACE_OF_ZERO: i32 = 8;
 const PLACE_OF_FULL: i32 = 9;
+
+/// Encodes a row of blocks: `rows` are four rows of 4·n voxels, `blocks` takes 8·n bytes.
+pub(super) fn encode_row(rows: [&[u8]; 4], blocks: &mut [u8], _: EncodeOptions) {
+    for (x, block) in blocks.chunks_exact_mut(8).enumerate() {
+        let texels = std::array::from_fn(|i| [rows[i / 4][4 * x + i % 4]]);
+        block.copy_from_slice(&encode(&texels));
+    }
+}
 
 /// Encodes one block.
 pub(super) fn encode(texels: &Texels<1>) -> [u8; 8] {

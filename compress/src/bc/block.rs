@@ -1,4 +1,4 @@
-//! Gather and scatter of 4×4 blocks in slices of a volume, the rule at edges, and the spread over threads.
+//! Rows of 4×4 blocks in the slices of a volume, the rule at edges, and the spread over threads.
 
 use rayon::prelude::*;
 
@@ -7,45 +7,42 @@ use crate::Extent3;
 /// Voxels of a block, in x and in y.
 const EDGE: usize = 4;
 
-/// Slices of a work unit.
-const UNIT_SLICES: usize = 4;
-
 /// The 16 voxels of one block, `[x, y]`, x fastest; `N` bytes a voxel.
 pub(super) type Texels<const N: usize> = [[u8; N]; EDGE * EDGE];
 
-/// One row of work units: up to four slices of one row of blocks, and where they go.
-struct UnitRow<'a> {
-    /// First slice.
-    z: usize,
-    /// Row of blocks.
-    block_y: usize,
-    /// The bytes of that row of blocks in each of the slices.
-    rows: Vec<&'a mut [u8]>,
-}
-
-/// Encodes all blocks of a volume. `samples` and `blocks` have the lengths of the extent.
-pub(super) fn encode<const N: usize, const BYTES: usize>(
+/// Encodes all blocks of a volume, `block_bytes` each. `samples` and `blocks` have the lengths of the extent.
+///
+/// `encode_row` is given four rows of voxels, whole blocks long, and the bytes of their row of blocks.
+pub(super) fn encode<const N: usize>(
     samples: &[u8],
     extent: Extent3,
     blocks: &mut [u8],
-    encode_block: impl Fn(&Texels<N>) -> [u8; BYTES] + Sync,
+    block_bytes: usize,
+    encode_row: impl Fn([&[[u8; N]]; EDGE], &mut [u8]) + Sync,
 ) {
     let (voxels, _) = samples.as_chunks::<N>();
-    unit_rows(extent, blocks, BYTES).into_par_iter().for_each(|mut unit_row| {
-        for block_x in 0..extent.blocks()[0] {
-            let mut last: Option<(Texels<N>, [u8; BYTES])> = None;
-            for (slice, row) in unit_row.rows.iter_mut().enumerate() {
-                let texels = gather(voxels, extent, [block_x, unit_row.block_y, unit_row.z + slice]);
-                // Within a unit the slice before is often the same, in air nearly always.
-                let bytes = match last {
-                    Some((before, bytes)) if before == texels => bytes,
-                    _ => encode_block(&texels),
-                };
-                row[block_x * BYTES..][..BYTES].copy_from_slice(&bytes);
-                last = Some((texels, bytes));
+    let [blocks_x, blocks_y, _] = extent.blocks();
+    let padded = blocks_x * EDGE;
+    blocks.par_chunks_mut(blocks_x * block_bytes).enumerate().for_each_init(
+        || vec![[0; N]; if padded == extent.x() { 0 } else { EDGE * padded }],
+        |scratch, (row, bytes)| {
+            let (z, y) = (row / blocks_y, row % blocks_y * EDGE);
+            // Past the far edges the last row, and the last voxel, are repeated.
+            let line = |j: usize| {
+                let y = (y + j).min(extent.y() - 1);
+                &voxels[(z * extent.y() + y) * extent.x()..][..extent.x()]
+            };
+            if padded == extent.x() {
+                return encode_row(std::array::from_fn(line), bytes);
             }
-        }
-    });
+            for (j, row) in scratch.chunks_exact_mut(padded).enumerate() {
+                let line = line(j);
+                row[..line.len()].copy_from_slice(line);
+                row[line.len()..].fill(line[line.len() - 1]);
+            }
+            encode_row(std::array::from_fn(|j| &scratch[j * padded..][..padded]), bytes);
+        },
+    );
 }
 
 /// Decodes all blocks of a volume. `blocks` and `samples` have the lengths of the extent.
@@ -69,45 +66,6 @@ pub(super) fn decode<const N: usize, const BYTES: usize>(
     });
 }
 
-/// Splits the blocks of a volume into rows of work units, each with its own part of `blocks`.
-fn unit_rows(extent: Extent3, blocks: &mut [u8], block_bytes: usize) -> Vec<UnitRow<'_>> {
-    let [blocks_x, blocks_y, slices] = extent.blocks();
-    let row_bytes = blocks_x * block_bytes;
-    let slice_bytes = row_bytes * blocks_y;
-    let mut unit_rows = Vec::with_capacity(blocks_y * slices.div_ceil(UNIT_SLICES));
-    for (slab, bytes) in blocks.chunks_mut(slice_bytes * UNIT_SLICES).enumerate() {
-        let first = unit_rows.len();
-        unit_rows.extend((0..blocks_y).map(|block_y| UnitRow {
-            z: slab * UNIT_SLICES,
-            block_y,
-            rows: Vec::with_capacity(UNIT_SLICES),
-        }));
-        for slice in bytes.chunks_mut(slice_bytes) {
-            for (unit_row, row) in unit_rows[first..].iter_mut().zip(slice.chunks_mut(row_bytes)) {
-                unit_row.rows.push(row);
-            }
-        }
-    }
-    unit_rows
-}
-
-/// The voxels of block `[x, y, z]`. Past the far edges the last voxel is repeated.
-fn gather<const N: usize>(voxels: &[[u8; N]], extent: Extent3, block: [usize; 3]) -> Texels<N> {
-    let [x, y, z] = [block[0] * EDGE, block[1] * EDGE, block[2]];
-    let mut texels = [[0; N]; EDGE * EDGE];
-    for (j, row) in texels.chunks_exact_mut(EDGE).enumerate() {
-        let line = (z * extent.y() + (y + j).min(extent.y() - 1)) * extent.x();
-        if x + EDGE <= extent.x() {
-            row.copy_from_slice(&voxels[line + x..][..EDGE]);
-        } else {
-            for (i, texel) in row.iter_mut().enumerate() {
-                *texel = voxels[line + (x + i).min(extent.x() - 1)];
-            }
-        }
-    }
-    texels
-}
-
 /// Writes the voxels of a block that lie inside the volume; `rows` begins at the block's first row.
 fn scatter<const N: usize>(texels: &Texels<N>, rows: &mut [[u8; N]], row_len: usize, block_x: usize) {
     let x = block_x * EDGE;
@@ -122,8 +80,12 @@ mod tests {
     use super::*;
 
     /// A "codec" that keeps the 16 bytes of a block, to see the order of blocks and voxels alone.
-    fn keep(texels: &Texels<1>) -> [u8; 16] {
-        texels.as_flattened().try_into().unwrap()
+    fn keep(rows: [&[[u8; 1]]; EDGE], blocks: &mut [u8]) {
+        for (x, block) in blocks.chunks_exact_mut(EDGE * EDGE).enumerate() {
+            for (row, line) in rows.iter().zip(block.chunks_exact_mut(EDGE)) {
+                line.copy_from_slice(row[x * EDGE..][..EDGE].as_flattened());
+            }
+        }
     }
 
     #[test]
@@ -131,7 +93,7 @@ mod tests {
         let extent = Extent3::new([5, 6, 5]).unwrap();
         let samples: Vec<u8> = (0..150).collect();
         let mut blocks = vec![0; extent.block_count() * 16];
-        encode(&samples, extent, &mut blocks, keep);
+        encode(&samples, extent, &mut blocks, 16, keep);
         for z in 0..5 {
             for block_y in 0..2 {
                 for block_x in 0..2 {
@@ -154,7 +116,7 @@ mod tests {
             let extent = Extent3::new(sizes).unwrap();
             let samples: Vec<u8> = (0..extent.voxels()).map(|i| (i * 7 + i / 251) as u8).collect();
             let mut blocks = vec![0; extent.block_count() * 16];
-            encode(&samples, extent, &mut blocks, keep);
+            encode(&samples, extent, &mut blocks, 16, keep);
             let mut back = vec![0; samples.len()];
             decode(&blocks, extent, &mut back, |block: [u8; 16]| block.map(|byte| [byte]));
             assert_eq!(back, samples, "{sizes:?}");

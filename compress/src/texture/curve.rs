@@ -252,7 +252,10 @@ mod tests {
             for distance in (0..=span * 257).step_by(13) {
                 let place = (distance * u32::from(unit) * u32::from(factor) >> 16) + 0x800 >> 12;
                 let exact = f64::from(distance) * 7.0 / f64::from(span * 257);
-                assert!((f64::from(place) - exact).abs() < 0.501, "{distance} of {span}: {place}, not {exact}");
+                assert!(
+                    (f64::from(place) - exact).abs() < 0.501,
+                    "{distance} of {span}: {place}, not {exact}"
+                );
             }
         }
     }

@@ -11,13 +11,13 @@ use rayon::prelude::*;
 
 use super::bricks::SkipMap;
 use super::curve;
-use super::table::ColourTable;
 use super::rows::{EDGE, GROUP, Group, Ranges, Rows};
+use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
 use super::{EncodeStats, Part};
-use crate::bc::{self, EncodeOptions, Level};
 use crate::BlockFormat;
+use crate::bc::{self, EncodeOptions, Level};
 use crate::simd::Simd;
 
 /// Blocks of one task, about: enough that starting it costs nothing, few enough to share out evenly.
@@ -175,7 +175,9 @@ pub(super) fn colours<const BYTES: usize>(
     format: BlockFormat,
     blocks: &mut [u8],
 ) -> EncodeStats {
-    job.rows::<BYTES>(blocks, |scratch, blocks, first| colour_task(job, table, format, scratch, blocks, first))
+    job.rows::<BYTES>(blocks, |scratch, blocks, first| {
+        colour_task(job, table, format, scratch, blocks, first)
+    })
 }
 
 /// Encodes some rows of blocks, `first` of the part and those after it.
@@ -278,7 +280,7 @@ impl<const BYTES: usize> ColourTask<'_, BYTES> {
 
     fn flush_colours(&mut self) {
         let (format, options) = (self.format, self.options);
-        self.colours.flush(self.blocks, |rows, out| bc::encode_row(format, rows, out, options));
+        self.colours.flush(self.blocks, |rows, out| bc::encode_colours(format, rows, out, options));
     }
 }
 
@@ -352,7 +354,7 @@ impl ScalarTask<'_> {
     fn flush(&mut self) {
         let options = self.options;
         self.scalars.flush(self.blocks, |rows, out| {
-            bc::encode_scalar_row(rows.map(|row| row.as_flattened()), out, options);
+            bc::encode_scalars(rows.map(|row| row.as_flattened()), out, options);
         });
     }
 }

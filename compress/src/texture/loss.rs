@@ -5,10 +5,10 @@ use rayon::prelude::*;
 use super::Mapping;
 use super::domain::{Domain, SampleKind};
 use super::rows::{EDGE, GROUP, Group, Rows, VOXELS};
-use crate::simd::Simd;
 use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
+use crate::simd::Simd;
 use crate::{BlockFormat, bc};
 
 /// The error of a texture over all voxels of its volume.
@@ -115,7 +115,7 @@ impl Errors for ColourErrors<'_> {
     }
 
     fn decode(&self, block: &[u8]) -> [[u8; 4]; VOXELS] {
-        bc::decode_colours(self.format, block)
+        bc::decode_colours(block)
     }
 
     #[inline(always)]

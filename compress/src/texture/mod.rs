@@ -7,7 +7,7 @@
 //!
 //! Most blocks of a CT are of one look, and those of nothing seen are known from their least and greatest sample
 //! alone: they are constants. With [`Bricks`] their samples are not even read. Blocks whose part of the transfer
-//! function is nearly straight are encoded from their places on it ([`Level::Fast`]); the rest go through the
+//! function is nearly straight are encoded from their places on it ([`crate::bc::Level::Fast`]); the rest go through the
 //! kernels of [`crate::bc`], many at a time.
 //!
 //! Each block depends on its own 16 voxels only. So the bytes are the same for any number of threads, with SIMD
@@ -44,7 +44,7 @@ pub use table::{ColourPoint, ColourTable};
 pub use volume::{Samples, Volume};
 pub use window::Window;
 
-use crate::bc::{EncodeOptions, Level};
+use crate::bc::EncodeOptions;
 use crate::simd::Simd;
 use crate::{BlockFormat, bc};
 use bricks::SkipMap;
@@ -90,7 +90,9 @@ pub enum TextureError {
         high: f64,
     },
     /// The mapping was made for samples of another type.
-    #[error("the samples are {samples:?}, but their mapping was made for {mapping:?}: make it for their type")]
+    #[error(
+        "the samples are {samples:?}, but their mapping was made for {mapping:?}: make it for their type"
+    )]
     Kind {
         /// Type of the samples.
         samples: SampleKind,
@@ -98,7 +100,9 @@ pub enum TextureError {
         mapping: SampleKind,
     },
     /// The mapping does not make what the format holds.
-    #[error("the mapping does not suit the format: colours need a table, opaque for BC1, and scalars a window")]
+    #[error(
+        "the mapping does not suit the format: colours need a table, opaque for BC1, and scalars a window"
+    )]
     Mapping,
     /// The bricks are not those of the grid.
     #[error("{found} bricks were given for a grid of {expected}: give the range of each brick")]
@@ -239,9 +243,9 @@ impl<'a> Source<'a> {
     pub fn with_bricks(mut self, bricks: Bricks<'_>) -> Result<Self, TextureError> {
         let grid = self.volume.grid();
         self.skip = Some(match self.mapping {
-            Mapping::Colours(table) => SkipMap::new(bricks, grid, |range| {
-                table.run(range.map(|value| table.domain().index(value)))
-            }),
+            Mapping::Colours(table) => {
+                SkipMap::new(bricks, grid, |range| table.run(range.map(|value| table.domain().index(value))))
+            }
             Mapping::Scalars(window) => SkipMap::new(bricks, grid, |range| {
                 let [low, high] = range.map(|value| window.texel(window.domain().index(value)));
                 (low == high).then_some(low.into())
@@ -394,11 +398,7 @@ impl<'a> Source<'a> {
 }
 
 fn check_len(bytes: &[u8], expected: usize) -> Result<(), TextureError> {
-    if bytes.len() == expected {
-        Ok(())
-    } else {
-        Err(TextureError::Length { expected, found: bytes.len() })
-    }
+    if bytes.len() == expected { Ok(()) } else { Err(TextureError::Length { expected, found: bytes.len() }) }
 }
 
 fn allocated(bytes: usize) -> Result<Vec<u8>, TextureError> {
