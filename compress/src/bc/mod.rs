@@ -206,17 +206,17 @@ pub fn encode_volume_with(
         BlockFormat::Bc1 => {
             block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
                 bc1::encode_row(rows, blocks, options);
-            })
+            });
         }
         BlockFormat::Bc3 => {
             block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
                 bc3::encode_row(rows, blocks, options);
-            })
+            });
         }
         BlockFormat::Bc4 => {
             block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
                 bc4::encode_row(rows.map(<[[u8; 1]]>::as_flattened), blocks, options);
-            })
+            });
         }
     }
     Ok(blocks)

@@ -118,11 +118,10 @@ impl Batch {
     fn colours(&self, lanes: usize) -> PerBlock<u64> {
         // The ways from the first end, that of the greatest sample, halfway between the thirds.
         let mut halfway = [[0_u16; BATCH]; 3];
-        for b in 0..lanes {
-            let span = u32::from(self.to[b] - self.from[b]);
-            halfway[0][b] = (span / 6) as u16;
-            halfway[1][b] = (span / 2) as u16;
-            halfway[2][b] = (span * 5 / 6) as u16;
+        for (halfway, sixths) in halfway.iter_mut().zip([1, 3, 5]) {
+            for (halfway, (from, to)) in halfway.iter_mut().zip(self.from.iter().zip(&self.to)) {
+                *halfway = (u32::from(to.wrapping_sub(*from)) * sixths / 6) as u16;
+            }
         }
         // Two bits a voxel, eight voxels a number.
         let mut thirds = [[0_u16; BATCH]; 2];
@@ -182,9 +181,9 @@ impl Batch {
             let (sevenths, shift) = (&mut sevenths[i / 4], 3 * (i as u16 % 4));
             for b in 0..lanes {
                 let from_top = top[b].saturating_sub(opacities[b]).min(span[b]).wrapping_mul(unit[b]);
-                let place = (u32::from(from_top) * u32::from(factor[b]) >> 16) as u16;
+                let place = ((u32::from(from_top) * u32::from(factor[b])) >> 16) as u16;
                 // Sevenths from the first end have the indices 0, then 2 to 7, then 1.
-                let next = place + 0x1800 >> 12 & 7;
+                let next = ((place + 0x1800) >> 12) & 7;
                 let index = next ^ u16::from(next < 2);
                 sevenths[b] |= index << shift;
             }
@@ -228,7 +227,7 @@ static SEVENTHS: [Sevenths; 256] = {
 fn packed([red, green, blue, _]: [u8; 4]) -> u64 {
     let [red, green, blue] = [red, green, blue].map(u64::from);
     // Exact for all of 8 bits: (31·v + 127)/255 and (63·v + 127)/255.
-    (red * 249 + 1014 >> 11) << 11 | (green * 253 + 505 >> 10) << 5 | blue * 249 + 1014 >> 11
+    ((red * 249 + 1014) >> 11) << 11 | ((green * 253 + 505) >> 10) << 5 | ((blue * 249 + 1014) >> 11)
 }
 
 #[cfg(test)]
@@ -250,7 +249,7 @@ mod tests {
         for span in 1..256_u32 {
             let Sevenths { unit, factor } = SEVENTHS[span as usize];
             for distance in (0..=span * 257).step_by(13) {
-                let place = (distance * u32::from(unit) * u32::from(factor) >> 16) + 0x800 >> 12;
+                let place = (((distance * u32::from(unit) * u32::from(factor)) >> 16) + 0x800) >> 12;
                 let exact = f64::from(distance) * 7.0 / f64::from(span * 257);
                 assert!(
                     (f64::from(place) - exact).abs() < 0.501,

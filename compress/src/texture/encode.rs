@@ -254,8 +254,8 @@ impl<const BYTES: usize> ColourTask<'_, BYTES> {
             let (run, last) = (runs[usize::from(low[i])], runs[usize::from(high[i])]);
             let (constant, is_constant) = (self.table.constant(run), run == last);
             *block = constant.block();
-            self.stats.clear += u64::from(is_constant & constant.clear);
-            self.stats.solid += u64::from(is_constant & !constant.clear);
+            self.stats.clear += u64::from(is_constant) & u64::from(constant.clear);
+            self.stats.solid += u64::from(is_constant) & u64::from(!constant.clear);
             mixed[mixed_count] = i;
             mixed_count += usize::from(!is_constant);
         }

@@ -53,6 +53,15 @@ fn add([squares, largest]: Sum, [more, error]: Sum) -> Sum {
     [squares + more, if error > largest { error } else { largest }]
 }
 
+/// What is known of a block without decoding it.
+enum Known<'a> {
+    Nothing,
+    /// It is without error.
+    Exact,
+    /// It is a constant, whose error follows from the index alone.
+    ByIndex(&'a [Sum]),
+}
+
 /// The errors of a mapping, as it is asked for them.
 trait Errors: Sync {
     /// Samples of a voxel.
@@ -64,9 +73,8 @@ trait Errors: Sync {
     fn decode(&self, block: &[u8]) -> [Self::Texel; VOXELS];
     /// The error of a texel where a voxel of this index is.
     fn error(&self, index: u16, texel: Self::Texel) -> Sum;
-    /// If the block is the constant that its range of indices makes: the error of each index in it, none if there are
-    /// only zeros.
-    fn constant(&self, range: [u16; 2], block: &[u8]) -> Option<Option<&[Sum]>>;
+    /// What is known of a block without decoding it, from its range of indices.
+    fn known(&self, range: [u16; 2], block: &[u8]) -> Known<'_>;
 }
 
 struct ColourErrors<'a> {
@@ -128,10 +136,13 @@ impl Errors for ColourErrors<'_> {
         })
     }
 
-    fn constant(&self, range: [u16; 2], block: &[u8]) -> Option<Option<&[Sum]>> {
-        let run = usize::from(self.table.run(range)?);
-        let is_it = block == self.table.constants()[run].bytes(self.format);
-        is_it.then_some((!self.exact[run]).then_some(&self.constant))
+    fn known(&self, range: [u16; 2], block: &[u8]) -> Known<'_> {
+        match self.table.run(range).map(usize::from) {
+            Some(run) if block != self.table.constants()[run].bytes(self.format) => Known::Nothing,
+            Some(run) if self.exact[run] => Known::Exact,
+            Some(_) => Known::ByIndex(&self.constant),
+            None => Known::Nothing,
+        }
     }
 }
 
@@ -167,8 +178,8 @@ impl Errors for ScalarErrors<'_> {
         [error * error, error]
     }
 
-    fn constant(&self, _: [u16; 2], _: &[u8]) -> Option<Option<&[Sum]>> {
-        None
+    fn known(&self, _: [u16; 2], _: &[u8]) -> Known<'_> {
+        Known::Nothing
     }
 }
 
@@ -252,12 +263,12 @@ fn sum_of_blocks<E: Errors>(
 /// The error of a block, over the voxels that are inside.
 fn of_block<E: Errors>(group: Group<'_>, i: usize, [x, y]: [usize; 2], errors: &E, block: &[u8]) -> Sum {
     let lines = (0..y).map(|j| group.block_row(i, j));
-    match errors.constant([group.ranges.low[i], group.ranges.high[i]], block) {
-        Some(None) => [0.0; 2],
-        Some(Some(by_index)) => {
+    match errors.known([group.ranges.low[i], group.ranges.high[i]], block) {
+        Known::Exact => [0.0; 2],
+        Known::ByIndex(by_index) => {
             lines.flat_map(|line| &line[..x]).fold([0.0; 2], |sum, i| add(sum, by_index[usize::from(*i)]))
         }
-        None => {
+        Known::Nothing => {
             let texels = errors.decode(block);
             let lines = lines.zip(texels.chunks_exact(EDGE));
             let voxels = lines.flat_map(|(line, texels)| line.iter().zip(texels).take(x));

@@ -139,7 +139,12 @@ fn ranges(rows: [&[u16; WIDE]; EDGE]) -> Ranges {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn ranges_avx2([a, b, c, d]: [&[u16; WIDE]; EDGE]) -> Ranges {
-    use std::arch::x86_64::*;
+    use std::arch::x86_64::{
+        __m256i, _mm_extract_epi16, _mm_minpos_epu16, _mm_packus_epi32, _mm_set1_epi8, _mm_setr_epi8,
+        _mm_shuffle_epi8, _mm_xor_si128, _mm256_and_si256, _mm256_castsi256_si128, _mm256_extracti128_si256,
+        _mm256_max_epu16, _mm256_min_epu16, _mm256_or_si256, _mm256_set1_epi64x, _mm256_slli_epi64,
+        _mm256_srli_epi32, _mm256_srli_epi64,
+    };
 
     let [a, b, c, d] = [a, b, c, d].map(|row| bytemuck::cast::<[u16; WIDE], [__m256i; 2]>(*row));
     let (mut least, mut most) = (a, a);

@@ -290,6 +290,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
 }
 
 /// A table of all entries. Only those that are written or read take memory.
+#[expect(clippy::unnecessary_box_returns, reason = "a table of that size is no value to move about")]
 fn entries<T: Copy + Default>() -> Box<[T; ENTRIES]> {
     let entries: Result<Box<[T; ENTRIES]>, _> = vec![T::default(); ENTRIES].into_boxed_slice().try_into();
     // The length is right, so the second way, through the stack, is never taken.
