@@ -10,7 +10,8 @@
 //! | [`BlockFormat::Bc4`] | 4×4×1 voxels in 8 bytes | 4 | no | one, 8-bit | encoder and decoder |
 //! | [`ktx2`], zstd inside | the whole level | by content | yes | those of its format | writer and reader |
 //!
-//! How they go together: [`bc::encode_volume`] turns samples into blocks, [`ktx2::write()`] puts them into a file,
+//! How they go together: [`texture::Source`] turns the samples of a scan into blocks, through a transfer function or
+//! a window, and [`bc::encode_volume`] does so with texels; [`ktx2::write()`] puts blocks into a file,
 //! [`ktx2::read()`] checks a file and gives them back, [`bc::decode_volume`] makes samples of them again, and
 //! [`quality::compare`] says what was lost. What a lossy codec loses is always measured against the samples
 //! that were given to it.

@@ -27,7 +27,7 @@ pub struct ColourPoint {
 ///
 /// The function is linear between its points and constant outside them; where two points have one value it jumps,
 /// and the value itself belongs to the later one. Samples of whole numbers each have their own entry, so the table
-/// is exact; for floats see [`Domain`].
+/// is exact; for floats see [`Domain`], and at a jump a float may fall to either side.
 ///
 /// **What is not seen.** Values whose opacity rounds to 0 of 255 are *clear*. A block with only such values of one
 /// run is a constant, of the colour of the seen values that the run adjoins: there, linear filtering mixes it in,
@@ -168,9 +168,9 @@ impl ColourTable {
         let [a, b] = range.map(|index| self.colours[usize::from(index)]);
         let apart = |c: usize| i32::from(a[c]) - i32::from(b[c]);
         let [red, green, blue] = [apart(0), apart(1), apart(2)];
-        let chord = (red * red + green * green + blue * blue) as f32;
+        let chord_squared = (red * red + green * green + blue * blue) as f32;
         let way = (to - from) as f32 * self.unit;
-        chord >= STRAIGHT * STRAIGHT * way * way || way < SHORT
+        chord_squared >= STRAIGHT * STRAIGHT * way * way || way < SHORT
     }
 
     /// The places on the curve, by index: opacity in the low half, the way along in the high half.
