@@ -8,11 +8,15 @@ use crate::{BlockFormat, bc};
 /// Entries of a table: one for each index that a [`Domain`] can give, so that none is out of bounds.
 const ENTRIES: usize = 1 << 16;
 
-/// How much of the way along a stretch of the curve its chord must be for the stretch to count as straight.
-const STRAIGHT: f32 = 0.7;
+/// How much of the way along a stretch of the curve its chord must be for the stretch to count as straight: 70 %, in
+/// hundredths of the square. On two CTs with three functions this costs at most 0.9 dB against 95 %.
+const STRAIGHT_PERCENT_SQUARED: i64 = 49;
+
+/// Fraction bits of [`ColourTable::unit`].
+const UNIT_BITS: u32 = 24;
 
 /// A stretch of colours so short, in 1/255 of a channel, that its bend is of the size of rounding.
-const SHORT: f32 = 6.0;
+const SHORT: i64 = 6;
 
 /// One point of a transfer function.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,8 +51,8 @@ pub struct ColourTable {
     places: Box<[u32; ENTRIES]>,
     /// By index: the colour at that place; of a clear value, that of its run's constant.
     colours: Box<[[u8; 4]; ENTRIES]>,
-    /// What one step of the way along the curve is; 1/255 of a channel.
-    unit: f32,
+    /// What one step of the way along the curve is; 2⁻²⁴ of 1/255 of a channel.
+    unit: i64,
     /// By run: its constant block.
     constants: Vec<Constant>,
 }
@@ -125,7 +129,7 @@ impl ColourTable {
             runs: entries(),
             places: entries(),
             colours: entries(),
-            unit: 0.0,
+            unit: 0,
             constants: Vec::new(),
         };
         table.sample(points);
@@ -168,9 +172,9 @@ impl ColourTable {
         let [a, b] = range.map(|index| self.colours[usize::from(index)]);
         let apart = |c: usize| i32::from(a[c]) - i32::from(b[c]);
         let [red, green, blue] = [apart(0), apart(1), apart(2)];
-        let chord_squared = (red * red + green * green + blue * blue) as f32;
-        let way = (to - from) as f32 * self.unit;
-        chord_squared >= STRAIGHT * STRAIGHT * way * way || way < SHORT
+        let chord_squared = i64::from(red * red + green * green + blue * blue);
+        let way = (i64::from(to - from) * self.unit) >> UNIT_BITS;
+        100 * chord_squared >= STRAIGHT_PERCENT_SQUARED * (way * way) || way < SHORT
     }
 
     /// The places on the curve, by index: opacity in the low half, the way along in the high half.
@@ -271,7 +275,7 @@ impl ColourTable {
             (last, *sum) = (here, way);
         }
         let scale = if way > 0.0 { 65535.0 / way } else { 0.0 };
-        self.unit = (way * 255.0 / 65535.0) as f32;
+        self.unit = (way * 255.0 / 65535.0 * f64::from(1 << UNIT_BITS)).round() as i64;
         for (i, way) in ways.into_iter().enumerate() {
             let opacity = (self.truth[i][3] * 65535.0 + 0.5) as u32;
             self.places[i] = opacity | ((way * scale + 0.5) as u32) << 16;
