@@ -15,7 +15,8 @@
 //! | [`lossless`]: LZO, LZ4, zstd | a chunk of a series | by content | yes | any bytes | packer and unpacker |
 //! | [`ktx2`], zstd inside | the whole level | by content | yes | those of its format | writer and reader |
 //!
-//! How they go together: [`bc::encode_volume`] turns samples into blocks, [`ktx2::write()`] puts them into a file,
+//! How they go together: [`texture::Source`] turns the samples of a scan into blocks, through a transfer function or
+//! a window, and [`bc::encode_volume`] does so with texels; [`ktx2::write()`] puts blocks into a file,
 //! [`ktx2::read()`] checks a file and gives them back, [`bc::decode_volume`] makes samples of them again, and
 //! [`quality::compare`] says what was lost. A series goes through [`pvtc`] and [`lossless`] into the file of
 //! [`container`], and comes back through [`stream`], ahead of its player. What a lossy codec loses is always measured against the samples

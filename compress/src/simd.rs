@@ -4,7 +4,6 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Simd {
     /// What every machine of the architecture has.
-    #[cfg_attr(all(target_arch = "x86_64", not(test)), expect(dead_code, reason = "what other machines use"))]
     Plain,
     /// AVX2, BMI1, BMI2 and LZCNT.
     #[cfg(target_arch = "x86_64")]

@@ -8,3 +8,4 @@ mod naive;
 mod phantom;
 mod pvtc;
 mod series;
+mod texture;

@@ -127,8 +127,7 @@ impl Domain {
             let place = if place > 0.0 { place } else { 0.0 };
             let place = if place < last { place } else { last };
             let index = (place + ROUND).to_bits() as u16;
-            // A sample that is not finite is the only one whose difference from itself is not zero.
-            *out = if sample - sample == 0.0 { index } else { self.padding };
+            *out = if sample.is_finite() { index } else { self.padding };
         }
     }
 }

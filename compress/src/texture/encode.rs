@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::bricks::SkipMap;
 use super::curve;
+use super::rows::{EDGE, GROUP, Group, Ranges, Rows};
 use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
@@ -19,70 +20,11 @@ use crate::BlockFormat;
 use crate::bc::{self, EncodeOptions, Level};
 use crate::simd::Simd;
 
-/// Voxels of a block along x, and along y.
-const EDGE: usize = 4;
-
 /// Blocks of one task, about: enough that starting it costs nothing, few enough to share out evenly.
 const TASK_BLOCKS: usize = 2048;
 
 /// Blocks that are handed to a kernel together.
 const BATCH: usize = curve::BATCH;
-
-/// Four rows of voxels as table indices, and what is known of each block in them.
-#[derive(Debug)]
-pub(super) struct Strip {
-    rows: [Vec<u16>; EDGE],
-    /// The least and the greatest index of each block.
-    low: Vec<u16>,
-    high: Vec<u16>,
-}
-
-impl Strip {
-    /// Buffers for rows of at most `blocks` blocks.
-    pub(super) fn new(blocks: usize) -> Self {
-        let row = || vec![0; blocks * EDGE];
-        Self { rows: [row(), row(), row(), row()], low: vec![0; blocks], high: vec![0; blocks] }
-    }
-
-    /// Reads `count` blocks from block `[x, y, z]` of the volume on. Past its edges the last voxel is repeated.
-    #[inline(always)]
-    pub(super) fn read(
-        &mut self,
-        volume: &Volume<'_>,
-        domain: &super::Domain,
-        [x, y, z]: [usize; 3],
-        count: usize,
-    ) {
-        let last = volume.extent().y() - 1;
-        for (j, row) in self.rows.iter_mut().enumerate() {
-            volume.indices(domain, [x * EDGE, (y * EDGE + j).min(last), z], &mut row[..count * EDGE]);
-        }
-        let [a, b, c, d] = self.rows.each_ref().map(|row| row[..count * EDGE].as_chunks::<EDGE>().0);
-        let (low, high) = (&mut self.low[..count], &mut self.high[..count]);
-        for i in 0..count {
-            let (mut least, mut most) = ([0; EDGE], [0; EDGE]);
-            for lane in 0..EDGE {
-                let [a, b, c, d] = [a[i][lane], b[i][lane], c[i][lane], d[i][lane]];
-                least[lane] = a.min(b).min(c.min(d));
-                most[lane] = a.max(b).max(c.max(d));
-            }
-            low[i] = least[0].min(least[1]).min(least[2].min(least[3]));
-            high[i] = most[0].max(most[1]).max(most[2].max(most[3]));
-        }
-    }
-
-    /// The least and the greatest index of block `i` of those read.
-    #[inline(always)]
-    pub(super) fn range(&self, i: usize) -> [u16; 2] {
-        [self.low[i], self.high[i]]
-    }
-
-    /// The indices of row `j` of block `i` of those read.
-    #[inline(always)]
-    pub(super) fn block_row(&self, i: usize, j: usize) -> &[u16] {
-        &self.rows[j][i * EDGE..][..EDGE]
-    }
-}
 
 /// Blocks of texels that wait to be encoded; `N` bytes a texel.
 #[derive(Debug)]
@@ -99,12 +41,12 @@ impl<const N: usize> TexelBatch<N> {
         Self { rows: [[[0; N]; BATCH * EDGE]; EDGE], at: [0; BATCH], len: 0 }
     }
 
-    /// Adds block `i` of a strip, as block `at` of the output; says whether the batch is full.
+    /// Adds block `i` of a group, as block `at` of the output; says whether the batch is full.
     #[inline(always)]
-    fn push(&mut self, strip: &Strip, i: usize, texel: impl Fn(u16) -> [u8; N], at: usize) -> bool {
+    fn push(&mut self, group: Group<'_>, i: usize, at: usize, texel: impl Fn(u16) -> [u8; N]) -> bool {
         for (j, row) in self.rows.iter_mut().enumerate() {
-            let out = &mut row[self.len * EDGE..][..EDGE];
-            for (out, index) in out.iter_mut().zip(strip.block_row(i, j)) {
+            let texels = &mut row[self.len * EDGE..][..EDGE];
+            for (out, index) in texels.iter_mut().zip(group.block_row(i, j)) {
                 *out = texel(*index);
             }
         }
@@ -119,6 +61,9 @@ impl<const N: usize> TexelBatch<N> {
         blocks: &mut [[u8; BYTES]],
         encode_row: impl FnOnce([&[[u8; N]]; EDGE], &mut [u8]),
     ) {
+        if self.len == 0 {
+            return;
+        }
         let mut encoded = [[0; BYTES]; BATCH];
         let encoded = &mut encoded[..self.len];
         encode_row(self.rows.each_ref().map(|row| &row[..self.len * EDGE]), encoded.as_flattened_mut());
@@ -132,7 +77,7 @@ impl<const N: usize> TexelBatch<N> {
 /// What one thread works with.
 #[derive(Debug)]
 struct Scratch {
-    strip: Strip,
+    rows: Rows,
     curve: Box<curve::Batch>,
     colours: Box<TexelBatch<4>>,
     scalars: Box<TexelBatch<1>>,
@@ -143,7 +88,7 @@ struct Scratch {
 impl Scratch {
     fn new(blocks: usize) -> Self {
         Self {
-            strip: Strip::new(blocks),
+            rows: Rows::new(blocks),
             curve: Box::new(curve::Batch::new()),
             colours: Box::new(TexelBatch::new()),
             scalars: Box::new(TexelBatch::new()),
@@ -180,10 +125,17 @@ impl Job<'_> {
             .reduce(EncodeStats::default, EncodeStats::plus)
     }
 
-    /// What is known beforehand of the blocks of a row that begins at block `at`.
-    fn know(&self, at: [usize; 3], known: &mut [Option<u16>]) {
-        if let Some(skip) = self.skip {
-            skip.know(&self.volume, at, known);
+    /// The stretches of a row that begins at block `at`: of blocks that are known to be of one run, and of blocks to
+    /// be read.
+    #[inline(always)]
+    fn spans<'b>(&self, at: [usize; 3], known: &'b mut [Option<u16>]) -> Spans<'b> {
+        let len = known.len();
+        match self.skip {
+            Some(skip) => {
+                skip.know(&self.volume, at, known);
+                Spans { known, at: 0, len }
+            }
+            None => Spans { known: &[], at: 0, len },
         }
     }
 
@@ -194,6 +146,28 @@ impl Job<'_> {
     }
 }
 
+/// Stretches of a row of `len` blocks, of which all is known or nothing.
+struct Spans<'a> {
+    known: &'a [Option<u16>],
+    at: usize,
+    len: usize,
+}
+
+impl Iterator for Spans<'_> {
+    type Item = (Range<usize>, Option<u16>);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
+        let (start, known) = (self.at, self.known.get(self.at).copied().flatten());
+        let same = |other: &&Option<u16>| **other == known;
+        self.at = match self.known {
+            [] => self.len,
+            all => start + all[start..].iter().take_while(same).count(),
+        };
+        (start < self.len).then_some((start..self.at, known))
+    }
+}
+
 /// Encodes the colours of a part as BC3, or as BC1 if a block has 8 bytes.
 pub(super) fn colours<const BYTES: usize>(
     job: &Job<'_>,
@@ -201,34 +175,12 @@ pub(super) fn colours<const BYTES: usize>(
     format: BlockFormat,
     blocks: &mut [u8],
 ) -> EncodeStats {
-    job.rows::<BYTES>(blocks, |scratch, blocks, first| match job.simd {
-        Simd::Plain => colour_task(job, table, format, scratch, blocks, first),
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(_) => {
-            #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-            // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
-            unsafe {
-                colour_task_avx2(job, table, format, scratch, blocks, first)
-            }
-        }
+    job.rows::<BYTES>(blocks, |scratch, blocks, first| {
+        colour_task(job, table, format, scratch, blocks, first)
     })
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-fn colour_task_avx2<const BYTES: usize>(
-    job: &Job<'_>,
-    table: &ColourTable,
-    format: BlockFormat,
-    scratch: &mut Scratch,
-    blocks: &mut [[u8; BYTES]],
-    first: usize,
-) -> EncodeStats {
-    colour_task(job, table, format, scratch, blocks, first)
-}
-
 /// Encodes some rows of blocks, `first` of the part and those after it.
-#[inline(always)]
 fn colour_task<const BYTES: usize>(
     job: &Job<'_>,
     table: &ColourTable,
@@ -237,78 +189,107 @@ fn colour_task<const BYTES: usize>(
     blocks: &mut [[u8; BYTES]],
     first: usize,
 ) -> EncodeStats {
-    let mut stats = EncodeStats { blocks: blocks.len() as u64, ..EncodeStats::default() };
-    let Scratch { strip, curve, colours, known, .. } = scratch;
-    let encode = |rows: [&[[u8; 4]]; EDGE], out: &mut [u8]| bc::encode_row(format, rows, out, job.options);
-    let constants = table.constants();
-    let constant = |run: u16| {
-        let constant = &constants[usize::from(run)];
-        (constant.clear, constant.block::<BYTES>())
+    let mut task = ColourTask {
+        table,
+        format,
+        options: job.options,
+        simd: job.simd,
+        curve: &mut scratch.curve,
+        colours: &mut scratch.colours,
+        blocks,
+        stats: EncodeStats::default(),
     };
     let width = job.part.count[0];
-    for row in 0..blocks.len() / width {
-        let at = job.row_at(first + row);
-        job.know(at, known);
-        for (span, run) in spans(known) {
-            let begin = row * width + span.start;
+    for row in 0..task.blocks.len() / width {
+        let ([x, y, z], begin) = (job.row_at(first + row), row * width);
+        for (span, run) in job.spans([x, y, z], &mut scratch.known) {
+            let at = begin + span.start;
             if let Some(run) = run {
-                blocks[begin..begin + span.len()].fill(constant(run).1);
-                stats.skipped += span.len() as u64;
-                continue;
-            }
-            strip.read(&job.volume, table.domain(), [at[0] + span.start, at[1], at[2]], span.len());
-            for i in 0..span.len() {
-                let range = strip.range(i);
-                if let Some(run) = table.run(range) {
-                    let (clear, block) = constant(run);
-                    blocks[begin + i] = block;
-                    stats.clear += u64::from(clear);
-                    stats.solid += u64::from(!clear);
-                } else if job.options.level == Level::Fast && table.is_straight(range) {
-                    stats.curve += 1;
-                    if curve.push(strip, i, table, begin + i) {
-                        curve.flush(blocks);
-                    }
-                } else if colours.push(strip, i, |index| table.texels()[usize::from(index)], begin + i) {
-                    colours.flush(blocks, encode);
+                task.blocks[at..at + span.len()].fill(table.constant(run).block());
+                task.stats.skipped += span.len() as u64;
+            } else {
+                let from = [x + span.start, y, z];
+                scratch.rows.read(&job.volume, table.domain(), from, span.len(), job.simd);
+                for first in (0..span.len()).step_by(GROUP) {
+                    let count = GROUP.min(span.len() - first);
+                    task.group(scratch.rows.group(first / GROUP), at + first, count);
                 }
             }
         }
     }
-    curve.flush(blocks);
-    colours.flush(blocks, encode);
-    stats
+    task.curve.flush(task.blocks, task.simd);
+    task.flush_colours();
+    EncodeStats { blocks: task.blocks.len() as u64, ..task.stats }
+}
+
+/// Some rows of blocks of colours on the way.
+struct ColourTask<'a, const BYTES: usize> {
+    table: &'a ColourTable,
+    format: BlockFormat,
+    options: EncodeOptions,
+    simd: Simd,
+    curve: &'a mut curve::Batch,
+    colours: &'a mut TexelBatch<4>,
+    blocks: &'a mut [[u8; BYTES]],
+    stats: EncodeStats,
+}
+
+impl<const BYTES: usize> ColourTask<'_, BYTES> {
+    /// Encodes the first `count` blocks of a group, from block `at` of the output on.
+    #[inline(always)]
+    fn group(&mut self, group: Group<'_>, at: usize, count: usize) {
+        let Ranges { low, high, all } = group.ranges;
+        if let Some(run) = self.table.run(*all) {
+            let constant = self.table.constant(run);
+            self.blocks[at..at + count].fill(constant.block());
+            *(if constant.clear { &mut self.stats.clear } else { &mut self.stats.solid }) += count as u64;
+            return;
+        }
+        // Without branches, since here nothing is likely: each block becomes a constant, and those that are none are
+        // listed to be written again.
+        let mut mixed = [0; GROUP + 1];
+        let mut mixed_count = 0;
+        for (i, block) in self.blocks[at..at + count].iter_mut().enumerate() {
+            let runs = self.table.runs();
+            let (run, last) = (runs[usize::from(low[i])], runs[usize::from(high[i])]);
+            let (constant, is_constant) = (self.table.constant(run), run == last);
+            *block = constant.block();
+            self.stats.clear += u64::from(is_constant) & u64::from(constant.clear);
+            self.stats.solid += u64::from(is_constant) & u64::from(!constant.clear);
+            mixed[mixed_count] = i;
+            mixed_count += usize::from(!is_constant);
+        }
+        for i in &mixed[..mixed_count] {
+            let i = i & (GROUP - 1);
+            self.mixed(group, i, [low[i], high[i]], at + i);
+        }
+    }
+
+    /// Encodes block `i` of a group, of more than one look, as block `at` of the output.
+    #[inline(always)]
+    fn mixed(&mut self, group: Group<'_>, i: usize, range: [u16; 2], at: usize) {
+        if self.options.level == Level::Fast && self.table.is_straight(range) {
+            self.stats.curve += 1;
+            if self.curve.push(group, i, range, self.table, at) {
+                self.curve.flush(self.blocks, self.simd);
+            }
+        } else if self.colours.push(group, i, at, |index| self.table.texels()[usize::from(index)]) {
+            self.flush_colours();
+        }
+    }
+
+    fn flush_colours(&mut self) {
+        let (format, options) = (self.format, self.options);
+        self.colours.flush(self.blocks, |rows, out| bc::encode_colours(format, rows, out, options));
+    }
 }
 
 /// Encodes the scalars of a part as BC4.
 pub(super) fn scalars(job: &Job<'_>, window: &Window, blocks: &mut [u8]) -> EncodeStats {
-    job.rows::<8>(blocks, |scratch, blocks, first| match job.simd {
-        Simd::Plain => scalar_task(job, window, scratch, blocks, first),
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(_) => {
-            #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-            // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
-            unsafe {
-                scalar_task_avx2(job, window, scratch, blocks, first)
-            }
-        }
-    })
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-fn scalar_task_avx2(
-    job: &Job<'_>,
-    window: &Window,
-    scratch: &mut Scratch,
-    blocks: &mut [[u8; 8]],
-    first: usize,
-) -> EncodeStats {
-    scalar_task(job, window, scratch, blocks, first)
+    job.rows::<8>(blocks, |scratch, blocks, first| scalar_task(job, window, scratch, blocks, first))
 }
 
 /// Encodes some rows of blocks, `first` of the part and those after it.
-#[inline(always)]
 fn scalar_task(
     job: &Job<'_>,
     window: &Window,
@@ -316,45 +297,69 @@ fn scalar_task(
     blocks: &mut [[u8; 8]],
     first: usize,
 ) -> EncodeStats {
-    let mut stats = EncodeStats { blocks: blocks.len() as u64, ..EncodeStats::default() };
-    let Scratch { strip, scalars, known, .. } = scratch;
-    let encode = |rows: [&[[u8; 1]]; EDGE], out: &mut [u8]| {
-        bc::encode_scalar_row(rows.map(|row| row.as_flattened()), out, job.options);
+    let mut task = ScalarTask {
+        window,
+        options: job.options,
+        scalars: &mut scratch.scalars,
+        blocks,
+        stats: EncodeStats::default(),
     };
-    // Both ends the same, all indices 0.
-    let constant = |texel: u8| [texel, texel, 0, 0, 0, 0, 0, 0];
     let width = job.part.count[0];
-    for row in 0..blocks.len() / width {
-        let at = job.row_at(first + row);
-        job.know(at, known);
-        for (span, texel) in spans(known) {
-            let begin = row * width + span.start;
+    for row in 0..task.blocks.len() / width {
+        let ([x, y, z], begin) = (job.row_at(first + row), row * width);
+        for (span, texel) in job.spans([x, y, z], &mut scratch.known) {
+            let at = begin + span.start;
             if let Some(texel) = texel {
-                blocks[begin..begin + span.len()].fill(constant(texel as u8));
-                stats.skipped += span.len() as u64;
-                continue;
-            }
-            strip.read(&job.volume, window.domain(), [at[0] + span.start, at[1], at[2]], span.len());
-            for i in 0..span.len() {
-                let [low, high] = strip.range(i).map(|index| window.texel(index));
-                if low == high {
-                    blocks[begin + i] = constant(low);
-                    stats.solid += 1;
-                } else if scalars.push(strip, i, |index| [window.texel(index)], begin + i) {
-                    scalars.flush(blocks, encode);
+                task.blocks[at..at + span.len()].fill(solid(texel as u8));
+                task.stats.skipped += span.len() as u64;
+            } else {
+                let from = [x + span.start, y, z];
+                scratch.rows.read(&job.volume, window.domain(), from, span.len(), job.simd);
+                for first in (0..span.len()).step_by(GROUP) {
+                    let count = GROUP.min(span.len() - first);
+                    task.group(scratch.rows.group(first / GROUP), at + first, count);
                 }
             }
         }
     }
-    scalars.flush(blocks, encode);
-    stats
+    task.flush();
+    EncodeStats { blocks: task.blocks.len() as u64, ..task.stats }
 }
 
-/// The stretches of blocks that are known to be of one run, and those that are to be read.
-fn spans(known: &[Option<u16>]) -> impl Iterator<Item = (Range<usize>, Option<u16>)> {
-    known.chunk_by(|a, b| a == b).scan(0, |start, chunk| {
-        let first = *start;
-        *start += chunk.len();
-        Some((first..*start, chunk[0]))
-    })
+/// Some rows of blocks of scalars on the way.
+struct ScalarTask<'a> {
+    window: &'a Window,
+    options: EncodeOptions,
+    scalars: &'a mut TexelBatch<1>,
+    blocks: &'a mut [[u8; 8]],
+    stats: EncodeStats,
+}
+
+impl ScalarTask<'_> {
+    /// Encodes the first `count` blocks of a group, from block `at` of the output on.
+    #[inline(always)]
+    fn group(&mut self, group: Group<'_>, at: usize, count: usize) {
+        let Ranges { low, high, .. } = group.ranges;
+        for (i, at) in (at..at + count).enumerate().take(GROUP) {
+            let [low, high] = [self.window.texel(low[i]), self.window.texel(high[i])];
+            if low == high {
+                self.blocks[at] = solid(low);
+                self.stats.solid += 1;
+            } else if self.scalars.push(group, i, at, |index| [self.window.texel(index)]) {
+                self.flush();
+            }
+        }
+    }
+
+    fn flush(&mut self) {
+        let options = self.options;
+        self.scalars.flush(self.blocks, |rows, out| {
+            bc::encode_scalars(rows.map(|row| row.as_flattened()), out, options);
+        });
+    }
+}
+
+/// The block of BC4 of one texel: both ends the same, all indices 0.
+fn solid(texel: u8) -> [u8; 8] {
+    [texel, texel, 0, 0, 0, 0, 0, 0]
 }

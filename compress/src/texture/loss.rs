@@ -4,14 +4,12 @@ use rayon::prelude::*;
 
 use super::Mapping;
 use super::domain::{Domain, SampleKind};
-use super::encode::Strip;
+use super::rows::{EDGE, GROUP, Group, Rows, VOXELS};
 use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
+use crate::simd::Simd;
 use crate::{BlockFormat, bc};
-
-/// Voxels of a block along x, and along y.
-const EDGE: usize = 4;
 
 /// The error of a texture over all voxels of its volume.
 ///
@@ -55,6 +53,15 @@ fn add([squares, largest]: Sum, [more, error]: Sum) -> Sum {
     [squares + more, if error > largest { error } else { largest }]
 }
 
+/// What is known of a block without decoding it.
+enum Known<'a> {
+    Nothing,
+    /// It is without error.
+    Exact,
+    /// It is a constant, whose error follows from the index alone.
+    ByIndex(&'a [Sum]),
+}
+
 /// The errors of a mapping, as it is asked for them.
 trait Errors: Sync {
     /// Samples of a voxel.
@@ -63,12 +70,11 @@ trait Errors: Sync {
     type Texel: Copy;
     fn domain(&self) -> &Domain;
     /// The texels of the block with these bytes.
-    fn decode(&self, block: &[u8]) -> [Self::Texel; EDGE * EDGE];
+    fn decode(&self, block: &[u8]) -> [Self::Texel; VOXELS];
     /// The error of a texel where a voxel of this index is.
     fn error(&self, index: u16, texel: Self::Texel) -> Sum;
-    /// If the block is the constant that its range of indices makes: the error of each index in it, none if there are
-    /// only zeros.
-    fn constant(&self, range: [u16; 2], block: &[u8]) -> Option<Option<&[Sum]>>;
+    /// What is known of a block without decoding it, from its range of indices.
+    fn known(&self, range: [u16; 2], block: &[u8]) -> Known<'_>;
 }
 
 struct ColourErrors<'a> {
@@ -116,8 +122,8 @@ impl Errors for ColourErrors<'_> {
         self.table.domain()
     }
 
-    fn decode(&self, block: &[u8]) -> [[u8; 4]; EDGE * EDGE] {
-        bc::decode_colours(self.format, block)
+    fn decode(&self, block: &[u8]) -> [[u8; 4]; VOXELS] {
+        bc::decode_colours(block)
     }
 
     #[inline(always)]
@@ -130,10 +136,13 @@ impl Errors for ColourErrors<'_> {
         })
     }
 
-    fn constant(&self, range: [u16; 2], block: &[u8]) -> Option<Option<&[Sum]>> {
-        let run = usize::from(self.table.run(range)?);
-        let is_it = block == self.table.constants()[run].bytes(self.format);
-        is_it.then_some((!self.exact[run]).then_some(&self.constant))
+    fn known(&self, range: [u16; 2], block: &[u8]) -> Known<'_> {
+        match self.table.run(range).map(usize::from) {
+            Some(run) if block != self.table.constants()[run].bytes(self.format) => Known::Nothing,
+            Some(run) if self.exact[run] => Known::Exact,
+            Some(_) => Known::ByIndex(&self.constant),
+            None => Known::Nothing,
+        }
     }
 }
 
@@ -159,7 +168,7 @@ impl Errors for ScalarErrors<'_> {
         self.window.domain()
     }
 
-    fn decode(&self, block: &[u8]) -> [u8; EDGE * EDGE] {
+    fn decode(&self, block: &[u8]) -> [u8; VOXELS] {
         bc::decode_scalars(block)
     }
 
@@ -169,8 +178,8 @@ impl Errors for ScalarErrors<'_> {
         [error * error, error]
     }
 
-    fn constant(&self, _: [u16; 2], _: &[u8]) -> Option<Option<&[Sum]>> {
-        None
+    fn known(&self, _: [u16; 2], _: &[u8]) -> Known<'_> {
+        Known::Nothing
     }
 }
 
@@ -179,14 +188,15 @@ pub(super) fn of_blocks(
     volume: &Volume<'_>,
     mapping: Mapping<'_>,
     format: BlockFormat,
+    simd: Simd,
     blocks: &[u8],
 ) -> Loss {
     match mapping {
         Mapping::Colours(table) => {
-            sum_of_blocks(volume, &ColourErrors::new(table, format), format.block_bytes(), blocks)
+            sum_of_blocks(volume, &ColourErrors::new(table, format), simd, format.block_bytes(), blocks)
         }
         Mapping::Scalars(window) => {
-            let loss = sum_of_blocks(volume, &ScalarErrors::new(window), format.block_bytes(), blocks);
+            let loss = sum_of_blocks(volume, &ScalarErrors::new(window), simd, format.block_bytes(), blocks);
             of_steps(loss, window.domain())
         }
     }
@@ -217,21 +227,28 @@ fn of_steps(loss: Loss, domain: &Domain) -> Loss {
     Loss { largest: loss.largest + domain.step() / 2.0, squares, ..loss }
 }
 
-fn sum_of_blocks<E: Errors>(volume: &Volume<'_>, errors: &E, block_bytes: usize, blocks: &[u8]) -> Loss {
+fn sum_of_blocks<E: Errors>(
+    volume: &Volume<'_>,
+    errors: &E,
+    simd: Simd,
+    block_bytes: usize,
+    blocks: &[u8],
+) -> Loss {
     let extent = volume.extent();
     let [width, height, _] = extent.blocks();
     let rows = blocks.par_chunks_exact(width * block_bytes).enumerate();
     let sums: Vec<Loss> = rows
         .map_init(
-            || Strip::new(width),
-            |strip, (row, blocks)| {
+            || Rows::new(width),
+            |buffer, (row, blocks)| {
                 let [y, z] = [row % height, row / height];
-                strip.read(volume, errors.domain(), [0, y, z], width);
+                buffer.read(volume, errors.domain(), [0, y, z], width, simd);
                 let mut loss = NONE;
-                for (i, block) in blocks.chunks_exact(block_bytes).enumerate() {
+                for (i, bytes) in blocks.chunks_exact(block_bytes).enumerate() {
                     // Voxels past the edges are not there to be wrong.
                     let inside = [(extent.x() - EDGE * i).min(EDGE), (extent.y() - EDGE * y).min(EDGE)];
-                    let [squares, largest] = of_block(strip, i, inside, errors, block);
+                    let group = buffer.group(i / GROUP);
+                    let [squares, largest] = of_block(group, i % GROUP, inside, errors, bytes);
                     let samples = E::SAMPLES * (inside[0] * inside[1]) as u64;
                     loss = loss.plus(Loss { largest: largest.into(), squares: squares.into(), samples });
                 }
@@ -243,27 +260,21 @@ fn sum_of_blocks<E: Errors>(volume: &Volume<'_>, errors: &E, block_bytes: usize,
     sums.into_iter().fold(NONE, Loss::plus)
 }
 
-/// The error of block `i` of a strip, over the voxels that are inside.
-fn of_block<E: Errors>(strip: &Strip, i: usize, [x, y]: [usize; 2], errors: &E, block: &[u8]) -> Sum {
-    let mut sum = [0.0; 2];
-    match errors.constant(strip.range(i), block) {
-        Some(None) => {}
-        Some(Some(by_index)) => {
-            for j in 0..y {
-                let indices = &strip.block_row(i, j)[..x];
-                sum = indices.iter().fold(sum, |sum, index| add(sum, by_index[usize::from(*index)]));
-            }
+/// The error of a block, over the voxels that are inside.
+fn of_block<E: Errors>(group: Group<'_>, i: usize, [x, y]: [usize; 2], errors: &E, block: &[u8]) -> Sum {
+    let lines = (0..y).map(|j| group.block_row(i, j));
+    match errors.known([group.ranges.low[i], group.ranges.high[i]], block) {
+        Known::Exact => [0.0; 2],
+        Known::ByIndex(by_index) => {
+            lines.flat_map(|line| &line[..x]).fold([0.0; 2], |sum, i| add(sum, by_index[usize::from(*i)]))
         }
-        None => {
+        Known::Nothing => {
             let texels = errors.decode(block);
-            for (j, texels) in texels.chunks_exact(EDGE).take(y).enumerate() {
-                for (index, texel) in strip.block_row(i, j).iter().zip(texels).take(x) {
-                    sum = add(sum, errors.error(*index, *texel));
-                }
-            }
+            let lines = lines.zip(texels.chunks_exact(EDGE));
+            let voxels = lines.flat_map(|(line, texels)| line.iter().zip(texels).take(x));
+            voxels.fold([0.0; 2], |sum, (index, texel)| add(sum, errors.error(*index, *texel)))
         }
     }
-    sum
 }
 
 /// Of texels the error follows from the index alone: it is enough to count those.

@@ -7,7 +7,7 @@
 //!
 //! Most blocks of a CT are of one look, and those of nothing seen are known from their least and greatest sample
 //! alone: they are constants. With [`Bricks`] their samples are not even read. Blocks whose part of the transfer
-//! function is nearly straight are encoded from their places on it ([`Level::Fast`]); the rest go through the
+//! function is nearly straight are encoded from their places on it ([`crate::bc::Level::Fast`]); the rest go through the
 //! kernels of [`crate::bc`], many at a time.
 //!
 //! Each block depends on its own 16 voxels only. So the bytes are the same for any number of threads, with SIMD
@@ -27,6 +27,7 @@ mod curve;
 mod domain;
 mod encode;
 mod loss;
+mod rows;
 mod table;
 mod texels;
 mod volume;
@@ -350,7 +351,7 @@ impl<'a> Source<'a> {
     pub fn loss_of_blocks(&self, format: BlockFormat, blocks: &[u8]) -> Result<Loss, TextureError> {
         check_len(blocks, format.encoded_len(self.volume.extent()))?;
         self.check_mapping(format)?;
-        Ok(loss::of_blocks(&self.volume, self.mapping, format, blocks))
+        Ok(loss::of_blocks(&self.volume, self.mapping, format, self.simd, blocks))
     }
 
     /// How far the uncompressed texture is from what the samples say: rounding alone, see [`Loss`]. Runs on the
@@ -402,4 +403,45 @@ fn check_len(bytes: &[u8], expected: usize) -> Result<(), TextureError> {
 
 fn allocated(bytes: usize) -> Result<Vec<u8>, TextureError> {
     bc::zeroed(bytes).ok_or(TextureError::OutOfMemory { bytes })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Extent3;
+    use crate::bc::Level;
+
+    #[test]
+    fn the_bytes_are_the_same_with_instructions_of_this_machine_and_without() {
+        let extent = Extent3::new([150, 37, 5]).unwrap();
+        let mut state = 1_u32;
+        let samples: Vec<i16> = (0..extent.voxels())
+            .map(|i| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                ((i % 150 * 17 + i / 150 * 5) % 3000) as i16 - 1000 + (state >> 26) as i16
+            })
+            .collect();
+        let points = [(-200.0, 0.1, 0.0), (0.0, 0.9, 0.4), (300.0, 0.2, 0.1), (1500.0, 1.0, 1.0)];
+        let points = points.map(|(value, c, a)| ColourPoint { value, rgba: [c, c * c, 1.0 - c, a] });
+        let table = ColourTable::new(&points, SampleKind::I16, 0.0).unwrap();
+        let window = Window::new([-500.0, 1000.0], SampleKind::I16, 0.0).unwrap();
+        let volume = Volume::new(Samples::I16(&samples), extent).unwrap();
+        let of = |mapping| {
+            let best = Source::new(volume, mapping).unwrap();
+            (Source { simd: Simd::Plain, ..Source::new(volume, mapping).unwrap() }, best)
+        };
+        let (plain, best) = of(Mapping::Colours(&table));
+        for level in [Level::Fast, Level::Best] {
+            let options = EncodeOptions::default().with_level(level);
+            let blocks = |source: &Source<'_>| source.blocks(BlockFormat::Bc3, options).unwrap();
+            assert!(blocks(&plain) == blocks(&best), "BC3 {level:?}");
+        }
+        assert!(plain.texels(TexelFormat::Rgba8) == best.texels(TexelFormat::Rgba8), "texels of colours");
+        let (plain, best) = of(Mapping::Scalars(&window));
+        let blocks = |source: &Source<'_>| source.blocks(BlockFormat::Bc4, EncodeOptions::default()).unwrap();
+        assert!(blocks(&plain) == blocks(&best), "BC4");
+        for format in [TexelFormat::R8, TexelFormat::R16] {
+            assert!(plain.texels(format) == best.texels(format), "{format:?}");
+        }
+    }
 }

@@ -2,16 +2,21 @@
 
 use super::TextureError;
 use super::domain::{Domain, SampleKind};
+use crate::bc::EncodeOptions;
 use crate::{BlockFormat, bc};
 
 /// Entries of a table: one for each index that a [`Domain`] can give, so that none is out of bounds.
 const ENTRIES: usize = 1 << 16;
 
-/// How much of the way along a stretch of the curve its chord must be for the stretch to count as straight.
-const STRAIGHT: f32 = 0.95;
+/// How much of the way along a stretch of the curve its chord must be for the stretch to count as straight: 70 %, in
+/// hundredths of the square. On two CTs with three functions this costs at most 0.9 dB against 95 %.
+const STRAIGHT_PERCENT_SQUARED: i64 = 49;
+
+/// Fraction bits of [`ColourTable::unit`].
+const UNIT_BITS: u32 = 24;
 
 /// A stretch of colours so short, in 1/255 of a channel, that its bend is of the size of rounding.
-const SHORT: f32 = 6.0;
+const SHORT: i64 = 6;
 
 /// One point of a transfer function.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +31,7 @@ pub struct ColourPoint {
 ///
 /// The function is linear between its points and constant outside them; where two points have one value it jumps,
 /// and the value itself belongs to the later one. Samples of whole numbers each have their own entry, so the table
-/// is exact; for floats see [`Domain`].
+/// is exact; for floats see [`Domain`], and at a jump a float may fall to either side.
 ///
 /// **What is not seen.** Values whose opacity rounds to 0 of 255 are *clear*. A block with only such values of one
 /// run is a constant, of the colour of the seen values that the run adjoins: there, linear filtering mixes it in,
@@ -46,8 +51,8 @@ pub struct ColourTable {
     places: Box<[u32; ENTRIES]>,
     /// By index: the colour at that place; of a clear value, that of its run's constant.
     colours: Box<[[u8; 4]; ENTRIES]>,
-    /// What one step of the way along the curve is; 1/255 of a channel.
-    unit: f32,
+    /// What one step of the way along the curve is; 2⁻²⁴ of 1/255 of a channel.
+    unit: i64,
     /// By run: its constant block.
     constants: Vec<Constant>,
 }
@@ -124,7 +129,7 @@ impl ColourTable {
             runs: entries(),
             places: entries(),
             colours: entries(),
-            unit: 0.0,
+            unit: 0,
             constants: Vec::new(),
         };
         table.sample(points);
@@ -167,9 +172,9 @@ impl ColourTable {
         let [a, b] = range.map(|index| self.colours[usize::from(index)]);
         let apart = |c: usize| i32::from(a[c]) - i32::from(b[c]);
         let [red, green, blue] = [apart(0), apart(1), apart(2)];
-        let chord = (red * red + green * green + blue * blue) as f32;
-        let way = (to - from) as f32 * self.unit;
-        chord >= STRAIGHT * STRAIGHT * way * way || way < SHORT
+        let chord_squared = i64::from(red * red + green * green + blue * blue);
+        let way = (i64::from(to - from) * self.unit) >> UNIT_BITS;
+        100 * chord_squared >= STRAIGHT_PERCENT_SQUARED * (way * way) || way < SHORT
     }
 
     /// The places on the curve, by index: opacity in the low half, the way along in the high half.
@@ -180,6 +185,18 @@ impl ColourTable {
     /// The colours at those places, by index.
     pub(super) fn colours(&self) -> &[[u8; 4]; ENTRIES] {
         &self.colours
+    }
+
+    /// The run of each index.
+    #[inline(always)]
+    pub(super) fn runs(&self) -> &[u16; ENTRIES] {
+        &self.runs
+    }
+
+    /// The constant block of a run.
+    #[inline(always)]
+    pub(super) fn constant(&self, run: u16) -> &Constant {
+        &self.constants[usize::from(run)]
     }
 
     /// The constant block of each run.
@@ -215,6 +232,7 @@ impl ColourTable {
     /// Numbers the runs of values that look the same, and finds the constant of each.
     fn find_runs(&mut self) {
         let texels = &self.texels[..=usize::from(self.domain.last())];
+        let options = EncodeOptions::default();
         let mut start = 0;
         for run in texels.chunk_by(|a, b| a == b || (a[3] == 0 && b[3] == 0)) {
             let end = start + run.len();
@@ -230,7 +248,10 @@ impl ColourTable {
             } else {
                 run[0]
             };
-            self.constants.push(Constant { clear, block: bc::constant(texel) });
+            let mut block = [0; 16];
+            let rows = [[texel; 4]; 4];
+            bc::encode_colours(BlockFormat::Bc3, rows.each_ref().map(|row| &row[..]), &mut block, options);
+            self.constants.push(Constant { clear, block });
             for (colour, own) in self.colours[start..end].iter_mut().zip(run) {
                 *colour = if clear { texel } else { *own };
             }
@@ -254,7 +275,7 @@ impl ColourTable {
             (last, *sum) = (here, way);
         }
         let scale = if way > 0.0 { 65535.0 / way } else { 0.0 };
-        self.unit = (way * 255.0 / 65535.0) as f32;
+        self.unit = (way * 255.0 / 65535.0 * f64::from(1 << UNIT_BITS)).round() as i64;
         for (i, way) in ways.into_iter().enumerate() {
             let opacity = (self.truth[i][3] * 65535.0 + 0.5) as u32;
             self.places[i] = opacity | ((way * scale + 0.5) as u32) << 16;
@@ -273,6 +294,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
 }
 
 /// A table of all entries. Only those that are written or read take memory.
+#[expect(clippy::unnecessary_box_returns, reason = "a table of that size is no value to move about")]
 fn entries<T: Copy + Default>() -> Box<[T; ENTRIES]> {
     let entries: Result<Box<[T; ENTRIES]>, _> = vec![T::default(); ENTRIES].into_boxed_slice().try_into();
     // The length is right, so the second way, through the stack, is never taken.

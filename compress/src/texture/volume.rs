@@ -100,21 +100,23 @@ impl<'a> Volume<'a> {
         self.low
     }
 
-    /// The table indices of `out.len()` voxels from `first` on in row `y` of slice `z` of the box; past the end of
-    /// the row its last voxel is repeated.
+    /// Where voxel `[x, y, z]` of the box is among the samples.
     #[inline(always)]
-    pub(super) fn indices(&self, domain: &Domain, [first, y, z]: [usize; 3], out: &mut [u16]) {
+    fn offset(&self, [x, y, z]: [usize; 3]) -> usize {
         let [low_x, low_y, low_z] = self.low;
-        let row = ((low_z + z) * self.grid.y() + low_y + y) * self.grid.x() + low_x;
-        let inside = out.len().min(self.extent.x() - first);
-        let (out, past) = out.split_at_mut(inside);
-        let at = row + first..row + first + inside;
+        ((low_z + z) * self.grid.y() + low_y + y) * self.grid.x() + low_x + x
+    }
+
+    /// The table indices of `out.len()` voxels from `[x, y, z]` of the box on, within one row.
+    #[inline(always)]
+    pub(super) fn indices(&self, domain: &Domain, at: [usize; 3], out: &mut [u16]) {
+        let first = self.offset(at);
+        let at = first..first + out.len();
         match self.samples {
             Samples::U8(samples) => domain.indices_u8(&samples[at], out),
             Samples::I16(samples) => domain.indices_i16(&samples[at], out),
             Samples::U16(samples) => domain.indices_u16(&samples[at], out),
             Samples::F32(samples) => domain.indices_f32(&samples[at], out),
         }
-        past.fill(out.last().copied().unwrap_or_default());
     }
 }
