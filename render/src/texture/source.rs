@@ -138,7 +138,7 @@ fn typed(grid: &Grid) -> Typed<'_> {
         Samples::I16(s) => Typed::I16(Cow::Borrowed(s)),
         Samples::U16(s) => Typed::U16(Cow::Borrowed(s)),
         Samples::F32(s) => Typed::F32(Cow::Borrowed(s)),
-        Samples::I8(s) => Typed::I16(converted(s, |v| i16::from(v))),
+        Samples::I8(s) => Typed::I16(converted(s, i16::from)),
         Samples::I32(s) if low >= -32768.0 && high <= 32767.0 => Typed::I16(converted(s, |v| v as i16)),
         Samples::U32(s) if high <= 65535.0 => Typed::U16(converted(s, |v| v as u16)),
         Samples::I32(s) => Typed::F32(converted(s, |v| v as f32)),
