@@ -122,7 +122,7 @@ pub struct CompressArgs {
     /// For a series: what packs the bytes once more, without loss.
     #[arg(long, value_enum, default_value_t = SecondStage::Zstd)]
     pub second: SecondStage,
-    /// For series: psnr=DB, mib=MEBIBYTES or fps=STEPS_PER_SECOND.
+    /// For series: psnr=DB, mib=MEBIBYTES or fps=STEPS.
     #[arg(long, value_name = "GOAL", value_parser = goal, default_value = "psnr=40")]
     pub goal: Goal,
     /// For series: reading from the disk that it is to play from, MB a second.

@@ -65,7 +65,7 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
     let moves = matches!(args.name, BenchName::Series | BenchName::Play);
     let input = match &args.data {
         Some(path) => input::open(path)?,
-        None if moves => input::of_source(Source::Builtin(sample::BEAT.to_owned()))?,
+        None if moves => input::of_source(&Source::Builtin(sample::BEAT.to_owned()))?,
         None => input::builtin()?,
     };
     let path = args.data.as_deref().unwrap_or(Path::new("the built-in data"));

@@ -33,7 +33,7 @@ pub fn open(path: &Path) -> Result<Input, Failure> {
         let case = file::load(path).map_err(Failure::Case)?;
         return load(case);
     }
-    let input = of_source(Source::path(path))?;
+    let input = of_source(&Source::path(path))?;
     if input.case.volumes.is_empty() && input.case.implants.is_empty() {
         let fault = "the data hold no volume and no surface; choose a file that does";
         return Err(Failure::Unfit(format!("{fault}: {}", path.display())));
@@ -45,8 +45,8 @@ pub fn open(path: &Path) -> Result<Input, Failure> {
 ///
 /// # Errors
 /// [`Failure`]: data that cannot be used.
-pub fn of_source(source: Source) -> Result<Input, Failure> {
-    let found = assets::open(&source, &Limits::default(), &Terminal::default())?;
+pub fn of_source(source: &Source) -> Result<Input, Failure> {
+    let found = assets::open(source, &Limits::default(), &Terminal::default())?;
     let mut assets = Assets::default();
     let mut case = Case { name: source.short_name(), ..Case::default() };
     for asset in found {
@@ -84,19 +84,16 @@ fn load(case: Case) -> Result<Input, Failure> {
 /// Adds data to a case as a volume or an implant of their own, with the defaults of their kind.
 fn case_of(case: &mut Case, asset: &assets::Asset) {
     let wish = asset.key.source.short_name();
-    match asset.data.range() {
-        Some(range) => {
-            let transfer = presets::default_for(asset.modality.as_deref(), range);
-            let id = case.free_volume_id(&wish);
-            let mut volume = Volume::new(id, asset.key.source.clone(), Arc::new(transfer));
-            volume.item = asset.key.item;
-            case.volumes.push(volume);
-        }
-        None => {
-            let mut implant = Implant::new(case.free_implant_id(&wish), asset.key.source.clone());
-            implant.item = asset.key.item;
-            case.implants.push(implant);
-        }
+    if let Some(range) = asset.data.range() {
+        let transfer = presets::default_for(asset.modality.as_deref(), range);
+        let id = case.free_volume_id(&wish);
+        let mut volume = Volume::new(id, asset.key.source.clone(), Arc::new(transfer));
+        volume.item = asset.key.item;
+        case.volumes.push(volume);
+    } else {
+        let mut implant = Implant::new(case.free_implant_id(&wish), asset.key.source.clone());
+        implant.item = asset.key.item;
+        case.implants.push(implant);
     }
 }
 

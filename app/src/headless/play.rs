@@ -141,7 +141,7 @@ fn automatic(bytes: &Bytes, folder: &Path, gpu: &Arc<Gpu>) -> Result<(StepCodec,
     let sample = bytes.steps.get(..choice::SAMPLE_STEPS).unwrap_or(&bytes.steps);
     let mut codecs: Vec<StepCodec> = settings().into_iter().map(|(codec, ..)| codec).collect();
     codecs.dedup();
-    let trials = choice::trials(sample, bytes.extent, codecs.into_iter(), machine, &mut |codec, payload| {
+    let trials = choice::trials(sample, bytes.extent, &codecs, machine, &mut |codec, payload| {
         sender.secs(codec, payload)
     });
     let trials = trials.map_err(|e| other(&e))?;

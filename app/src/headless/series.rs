@@ -21,7 +21,7 @@ use super::input::Input;
 use super::{Failure, Terminal, check_folder, compress, input, say};
 use crate::case::Volume;
 use crate::cli::{CompressArgs, EncoderName, Format, SecondStage};
-use crate::load::Progress;
+use crate::load::Progress as _;
 use crate::save::choice::{self, Choice, Machine};
 use crate::save::series::{self, Quantiser, SeriesError, SeriesOptions, decode_step, encode_group};
 use crate::scene;
@@ -111,7 +111,7 @@ fn choose(steps: &Steps, args: &CompressArgs) -> Result<(SeriesOptions, Value), 
         Some(sender) => sender.secs(codec, payload),
         None => Ok(0.0),
     };
-    let trials = choice::trials(&bytes.steps, bytes.extent, choice::schemes(), machine, &mut send);
+    let trials = choice::trials(&bytes.steps, bytes.extent, &choice::codecs(), machine, &mut send);
     let trials = trials.map_err(|e| Failure::Other(e.to_string()))?;
     let found = choice::choose(&trials, args.goal, count);
     let found =

@@ -336,18 +336,15 @@ impl Session {
 fn added(case: &Case, asset: &Asset) -> Edit {
     let source = asset.key.source.clone();
     let wish = source.short_name();
-    match asset.data.range() {
-        Some(range) => {
-            let transfer = presets::default_for(asset.modality.as_deref(), range);
-            let mut volume = Volume::new(case.free_volume_id(&wish), source, Arc::new(transfer));
-            volume.item = asset.key.item;
-            Edit::AddVolume(Box::new(volume))
-        }
-        None => {
-            let mut implant = Implant::new(case.free_implant_id(&wish), source);
-            implant.item = asset.key.item;
-            Edit::AddImplant(Box::new(implant))
-        }
+    if let Some(range) = asset.data.range() {
+        let transfer = presets::default_for(asset.modality.as_deref(), range);
+        let mut volume = Volume::new(case.free_volume_id(&wish), source, Arc::new(transfer));
+        volume.item = asset.key.item;
+        Edit::AddVolume(Box::new(volume))
+    } else {
+        let mut implant = Implant::new(case.free_implant_id(&wish), source);
+        implant.item = asset.key.item;
+        Edit::AddImplant(Box::new(implant))
     }
 }
 

@@ -81,15 +81,16 @@ fn numbered(items: Vec<Item>) -> Vec<Item> {
     }
     for mut group in groups.into_values() {
         group.sort_by_key(|(number, _)| *number);
-        let grids: Vec<&Grid> = group.iter().filter_map(|(_, item)| grid_of(item)).collect();
-        let same = |a: &Grid, b: &Grid| {
-            a.extent() == b.extent()
-                && a.world_from_voxel() == b.world_from_voxel()
-                && a.samples().kind() == b.samples().kind()
+        let follows = |(a, b): (&(u64, Item), &(u64, Item))| match (grid_of(&a.1), grid_of(&b.1)) {
+            (Some(one), Some(next)) => {
+                a.0 < b.0
+                    && one.extent() == next.extent()
+                    && one.world_from_voxel() == next.world_from_voxel()
+                    && one.samples().kind() == next.samples().kind()
+            }
+            _ => false,
         };
-        let is_series = grids.len() > 2
-            && grids.windows(2).all(|pair| same(pair[0], pair[1]))
-            && group.windows(2).all(|pair| pair[0].0 < pair[1].0);
+        let is_series = group.len() > 2 && group.iter().zip(group.iter().skip(1)).all(follows);
         if !is_series {
             rest.extend(group.into_iter().map(|(_, item)| item));
             continue;
@@ -206,12 +207,11 @@ mod tests {
         let mut items: Vec<Item> = names.map(|name| item(name, [2, 1, 1])).into();
         items.push(item("mask", [2, 1, 1]));
         let found = numbered(items);
-        assert_eq!(found.len(), 2, "a series and the mask");
-        let Content::Series(series) = &found[1].content else {
-            panic!("a series, not {:?}", found[1].content)
-        };
+        let [mask, found] = found.as_slice() else { panic!("a series and the mask, not {found:?}") };
+        assert_eq!(mask.name, "mask", "what has no number stays");
+        let Content::Series(series) = &found.content else { panic!("a series, not {:?}", found.content) };
         assert_eq!(series.times_secs(), [1.0, 2.0, 10.0], "by number, not by letter");
-        assert_eq!(found[1].notes[0].code, "folder.series", "and it is said");
+        assert_eq!(found.notes.first().map(|n| n.code), Some("folder.series"), "and it is said");
     }
 
     #[test]

@@ -4,23 +4,27 @@
 //! slowest of what goes on at the same time: reading it, unpacking it, and what the caller measures of sending it to
 //! the device (decoding there or on the CPU included).
 
+use std::cell::RefCell;
 use std::collections::HashMap;
 
 use compress::Extent3;
 use compress::container::StepCodec;
-use compress::lossless::ByteCodec;
-use compress::lossless::choose::{self as second, TrialError};
-use compress::pvtc::choose::{Similarity, similarity};
-use compress::pvtc::packed::Packing;
-use compress::pvtc::{Encoder, Layout};
+use compress::lossless::trial::{self, TrialError};
+use compress::lossless::{ByteCodec, Shape};
+use compress::pvtc::Encoder;
+use compress::pvtc::measure::{Scheme, Similarity, measure, similarity};
 use thiserror::Error;
 
-use super::series::{SeriesError, decode_step, encode_group};
+use super::series::{SeriesError, encode_group};
 
 /// Steps that are tried: whole groups of every scheme.
 pub const SAMPLE_STEPS: usize = 12;
-/// Level of zstd that is tried and written.
-const ZSTD_LEVEL: i32 = 3;
+/// Level of zstd that is tried, as [`compress::lossless::PackOptions`] writes it.
+const ZSTD_LEVEL: i32 = 6;
+/// Raw steps whose packing is tried.
+const RAW_STEPS: usize = 2;
+/// Times that a payload is sent; the shortest counts.
+const SENT: usize = 3;
 /// Trials that differ by less than this factor in time count as equally fast: clocks are no better.
 const AS_FAST: f64 = 1.05;
 
@@ -84,9 +88,8 @@ pub enum ChoiceError {
 }
 
 /// All that a series can be compressed with.
-pub fn schemes() -> impl Iterator<Item = StepCodec> {
-    let packed = Packing::ALL.into_iter().map(StepCodec::Packed);
-    Layout::ALL.into_iter().map(StepCodec::Pvtc).chain(packed).chain([StepCodec::Raw8])
+pub fn codecs() -> Vec<StepCodec> {
+    Scheme::all().map(codec_of).chain([StepCodec::Raw8]).collect()
 }
 
 /// How alike the voxels of a sample are, in space and in time; 1 is all alike.
@@ -98,51 +101,118 @@ pub fn likeness(sample: &[Vec<u8>], extent: Extent3) -> Result<Similarity, Choic
     similarity(&slices, extent).map_err(|e| SeriesError::Encode(e.to_string()).into())
 }
 
-/// Tries schemes on 8-bit steps. `send` takes a payload and gives the seconds that one of its steps takes on its way
-/// to the device.
+/// Tries schemes with every second stage on 8-bit steps, [`SAMPLE_STEPS`] or fewer.
+///
+/// Quality and size are those of a sample of boxes; `send` takes a payload of whole steps and gives the seconds that one
+/// of them takes on its way to the device.
 ///
 /// # Errors
 /// [`ChoiceError`].
 pub fn trials(
     sample: &[Vec<u8>],
     extent: Extent3,
-    codecs: impl Iterator<Item = StepCodec>,
+    codecs: &[StepCodec],
     machine: Machine,
     send: &mut dyn FnMut(StepCodec, Vec<u8>) -> Result<f64, String>,
 ) -> Result<Vec<Trial>, ChoiceError> {
-    let mut all = Vec::new();
-    for codec in codecs {
-        let group = usize::from(codec.steps_per_chunk());
-        let (mut squares, mut decoded) = (0_u64, Vec::new());
-        let mut seconds: HashMap<ByteCodec, (f64, f64)> = HashMap::new();
-        let mut send_secs = f64::INFINITY;
-        for steps in sample.chunks_exact(group.min(sample.len())) {
-            let payload = encode_group(codec, Encoder::Fitted, steps, extent)?;
-            for (i, step) in steps.iter().enumerate() {
-                decode_step(codec, &payload, extent, i, &mut decoded)?;
-                squares +=
-                    step.iter().zip(&decoded).map(|(a, b)| u64::from(a.abs_diff(*b)).pow(2)).sum::<u64>();
-            }
-            for trial in second::trials(&payload, codec.shape(extent), ZSTD_LEVEL)? {
-                let (bytes, secs) = seconds.entry(trial.form.codec).or_default();
-                *bytes += trial.packed_bytes as f64;
-                *secs += trial.secs(machine.disk_bytes_per_sec, machine.threads);
-            }
-            // The first payload warms up what sending needs.
-            for _ in 0..2 {
-                send_secs = send_secs.min(send(codec, payload.clone()).map_err(ChoiceError::Send)?);
-            }
+    let slices: Vec<&[u8]> = sample.iter().map(Vec::as_slice).collect();
+    let schemes = codecs.iter().filter_map(|codec| match codec {
+        StepCodec::Pvtc(layout) => Some(Scheme::Layout(*layout)),
+        StepCodec::Packed(packing) => Some(Scheme::Packed(*packing)),
+        StepCodec::Raw8 | StepCodec::Raw16 => None,
+    });
+    let second: RefCell<HashMap<StepCodec, Result<Vec<Stage>, TrialError>>> = RefCell::default();
+    let candidates = measure(&slices, extent, schemes, Encoder::Fitted, |scheme, bytes| {
+        let codec = codec_of(scheme);
+        let mut second = second.borrow_mut();
+        let stages = second.entry(codec).or_insert_with(|| Ok(Vec::new()));
+        match (stages, trial::trials(bytes, shape_of(codec, bytes.len()), ZSTD_LEVEL)) {
+            (Ok(stages), Ok(tried)) => Stage::add(stages, &tried),
+            (stages @ Ok(_), Err(error)) => *stages = Err(error),
+            (Err(_), _) => {}
         }
-        let tried = (sample.len() / group.min(sample.len()) * group.min(sample.len())) as f64;
-        let mean_square = squares as f64 / (tried * extent.voxels() as f64);
-        let psnr_db = 10.0 * (255.0 * 255.0 / mean_square).log10();
-        for byte_codec in ByteCodec::ALL {
-            let Some((bytes, secs)) = seconds.get(&byte_codec) else { continue };
-            let secs = (secs / tried).max(send_secs);
-            all.push(Trial { codec, byte_codec, psnr_db, bytes: bytes / tried, secs });
+        bytes.len()
+    })
+    .map_err(|e| SeriesError::Encode(e.to_string()))?;
+    let mut second = second.into_inner();
+    let mut all = Vec::new();
+    for &codec in codecs {
+        let (psnr_db, bytes, stages) = match candidates.iter().find(|c| codec_of(c.scheme) == codec) {
+            Some(candidate) => {
+                let stages = second.remove(&codec).unwrap_or_else(|| Ok(Vec::new()))?;
+                (candidate.psnr_db, candidate.bytes_per_step, stages)
+            }
+            // Too long a group for the sample.
+            None if codec != StepCodec::Raw8 => continue,
+            None => {
+                let mut stages = Vec::new();
+                for step in sample.iter().take(RAW_STEPS) {
+                    Stage::add(&mut stages, &trial::trials(step, codec.shape(extent), ZSTD_LEVEL)?);
+                }
+                (f64::INFINITY, extent.voxels() as f64, stages)
+            }
+        };
+        let group = usize::from(codec.steps_per_chunk()).min(sample.len());
+        let payload = encode_group(codec, Encoder::MinMax, &sample[..group], extent)?;
+        let mut send_secs = f64::INFINITY;
+        // The first warms up what sending needs.
+        for _ in 0..SENT {
+            send_secs = send_secs.min(send(codec, payload.clone()).map_err(ChoiceError::Send)?);
+        }
+        for stage in stages {
+            let packed = bytes * stage.packed / stage.payload;
+            let read = packed / machine.disk_bytes_per_sec;
+            let unpack = bytes * stage.secs / stage.payload / machine.threads.max(1) as f64;
+            let secs = read.max(unpack).max(send_secs);
+            all.push(Trial { codec, byte_codec: stage.byte_codec, psnr_db, bytes: packed, secs });
         }
     }
     Ok(all)
+}
+
+/// What a second stage did with all payloads of a sample: bytes before and after, seconds to unpack.
+struct Stage {
+    byte_codec: ByteCodec,
+    payload: f64,
+    packed: f64,
+    secs: f64,
+}
+
+impl Stage {
+    fn add(stages: &mut Vec<Self>, tried: &[trial::Trial]) {
+        for (byte_codec, trial) in ByteCodec::ALL.into_iter().zip(tried) {
+            let (payload, packed) = (trial.payload_bytes as f64, trial.packed_bytes as f64);
+            match stages.iter_mut().find(|stage| stage.byte_codec == byte_codec) {
+                Some(stage) => {
+                    stage.payload += payload;
+                    stage.packed += packed;
+                    stage.secs += trial.unpack_secs;
+                }
+                None => stages.push(Self { byte_codec, payload, packed, secs: trial.unpack_secs }),
+            }
+        }
+    }
+}
+
+fn codec_of(scheme: Scheme) -> StepCodec {
+    match scheme {
+        Scheme::Layout(layout) => StepCodec::Pvtc(layout),
+        Scheme::Packed(packing) => StepCodec::Packed(packing),
+    }
+}
+
+/// The elements of `bytes` bytes of a codec, of whatever extent.
+fn shape_of(codec: StepCodec, bytes: usize) -> Shape {
+    match codec {
+        StepCodec::Pvtc(layout) => {
+            let table = 4 * usize::from(layout.s());
+            let sub_volumes = bytes / (4 + table);
+            Shape::new(sub_volumes, 4).then(sub_volumes, table)
+        }
+        StepCodec::Packed(_) => Shape::new(bytes / 8, 8),
+        StepCodec::Raw8 => Shape::new(bytes, 1),
+        StepCodec::Raw16 => Shape::new(bytes / 2, 2),
+    }
 }
 
 /// The trial that keeps to a goal for a series of `steps`; none where nothing was tried.
@@ -213,7 +283,7 @@ mod tests {
         let extent = Extent3::new([8, 8, 4]).expect("extent");
         let sample: Vec<Vec<u8>> = (0..12_u8).map(|t| (0..=255).map(|i: u8| i / 4 + t).collect()).collect();
         let machine = Machine { disk_bytes_per_sec: 1e8, threads: 1 };
-        let all = trials(&sample, extent, schemes(), machine, &mut |_, _| Ok(1e-3)).expect("trials");
+        let all = trials(&sample, extent, &codecs(), machine, &mut |_, _| Ok(1e-3)).expect("trials");
         assert_eq!(all.len(), 19 * ByteCodec::ALL.len(), "16 layouts, TE, SE and raw, by every second stage");
         assert!(all.iter().all(|t| t.secs >= 1e-3), "sending takes a millisecond");
         let raw = all.iter().find(|t| t.codec == StepCodec::Raw8 && t.byte_codec == ByteCodec::Store);

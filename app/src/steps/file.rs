@@ -218,9 +218,7 @@ impl SeriesFile {
         }
     }
 
-    pub(super) fn want(&self, step: usize, is_forward: bool, is_looped: bool) {
-        let direction = if is_forward { Direction::Forward } else { Direction::Backward };
-        let repeat = if is_looped { Repeat::Loop } else { Repeat::Once };
+    pub(super) fn want(&self, step: usize, direction: Direction, repeat: Repeat) {
         let mut playing = self.playing();
         let chunk = self.chunk_of(step);
         let goes_on =

@@ -14,6 +14,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use compress::container::StepCodec;
+pub use compress::stream::{Direction, Repeat};
 use render::volume::{Grid, PackedStep, Series};
 
 pub use file::{SeriesFileError, is_series};
@@ -98,9 +99,9 @@ impl Steps {
     }
 
     /// Says that a step is due, and which come after it: they are read meanwhile.
-    pub fn want(&self, step: usize, is_forward: bool, is_looped: bool) {
+    pub fn want(&self, step: usize, direction: Direction, repeat: Repeat) {
         if let Source::File(file) = &self.source {
-            file.want(step, is_forward, is_looped);
+            file.want(step, direction, repeat);
         }
     }
 

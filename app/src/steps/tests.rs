@@ -69,10 +69,10 @@ fn what_is_wanted_becomes_ready_forwards_backwards_and_after_a_jump() {
     let folder = tempfile::tempdir().expect("folder");
     let (steps, _) =
         written(folder.path(), StepCodec::Pvtc(Layout::new(4, 2).expect("layout")), ByteCodec::Lzo);
-    let wait = |step: usize, forward: bool| {
+    let wait = |step: usize, direction: Direction| {
         let begin = Instant::now();
         loop {
-            steps.want(step, forward, true);
+            steps.want(step, direction, Repeat::Loop);
             if steps.is_ready(step) {
                 break;
             }
@@ -85,13 +85,13 @@ fn what_is_wanted_becomes_ready_forwards_backwards_and_after_a_jump() {
         }
     };
     for step in (0..9).chain(0..4) {
-        wait(step, true);
+        wait(step, Direction::Forward);
     }
     for step in [3, 2, 1, 0, 8, 7, 6] {
-        wait(step, false);
+        wait(step, Direction::Backward);
     }
     for step in [1, 8, 0, 5] {
-        wait(step, true);
+        wait(step, Direction::Forward);
         assert!(steps.grid(step).is_some(), "and can be looked at");
     }
     assert_eq!(steps.fault(), None, "nothing went wrong");

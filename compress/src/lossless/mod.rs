@@ -5,16 +5,16 @@
 //! caller, so that playing allocates nothing. [`Form`] is what a reader must know of a packed payload, next to its
 //! [`Shape`]; its two ids stand in files.
 //!
-//! Parts: `planes` the separation, `lzo` that codec, `pack` and `unpack` the two ways, [`choose`] which codec suits
-//! a disk.
+//! Parts: `planes` the separation, `lzo` that codec, `pack` and `unpack` the two ways, [`trial`] what each codec
+//! costs and saves.
 //!
 //! Source: *Nagayasu*, section 3.2.3, whose second stage is LZO on the blocks as they are. Differs: planes, LZ4 and
 //! zstd beside LZO, and storing what does not pay, which Nagayasu's section 4.1 found to be needed.
 
-pub mod choose;
 mod lzo;
 mod pack;
 mod planes;
+pub mod trial;
 mod unpack;
 
 pub use pack::{PackError, PackOptions, Packed, Packer};

@@ -60,16 +60,16 @@
 //! while another rises can share its table; decoders do not care.
 //!
 //! Parts: `ends` the fields and values, `encode` and `fit` the two encoders, `decode` the decoder; [`packed`] is the
-//! other way to a texture, PVTC-TE and PVTC-SE, which texture hardware decodes; [`choose`] measures which of all these
-//! suits a series and a target.
+//! other way to a texture, PVTC-TE and PVTC-SE, which texture hardware decodes; [`measure`] tries what each of these
+//! makes of a series.
 //!
 //! Source: *Yamada*, sections 2 and 3; *Nagayasu*, section 3.2.
 
-pub mod choose;
 mod decode;
 mod encode;
 mod ends;
 mod fit;
+pub mod measure;
 pub mod packed;
 
 use std::fmt;

@@ -1,6 +1,6 @@
 //! PVTC against a naive codec from the papers, an independent BC1 decoder, and its own promises.
 
-mod choose;
+mod measure;
 mod naive;
 mod packed;
 

@@ -1,17 +1,9 @@
 //! Which step is due: from the clock on the wall, the times of the steps, speed and direction. No window.
 
+use crate::steps::{Direction, Repeat};
+
 /// Slowest and fastest playing, against the steps' own times.
 pub(super) const SPEEDS: [f64; 2] = [0.05, 20.0];
-
-/// Which way time runs.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Direction {
-    /// From the first step to the last.
-    #[default]
-    Forward,
-    /// Back.
-    Backward,
-}
 
 /// What is due.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +30,7 @@ pub struct Clock {
     speed: f64,
     direction: Direction,
     /// Whether the first step follows the last.
-    pub looped: bool,
+    pub repeat: Repeat,
     start: Option<Start>,
     shown: u64,
     dropped: u64,
@@ -48,7 +40,7 @@ pub struct Clock {
 impl Default for Clock {
     fn default() -> Self {
         let (direction, start) = (Direction::Forward, None);
-        Self { speed: 1.0, direction, looped: true, start, shown: 0, dropped: 0, playing_since: 0.0 }
+        Self { speed: 1.0, direction, repeat: Repeat::Loop, start, shown: 0, dropped: 0, playing_since: 0.0 }
     }
 }
 
@@ -130,7 +122,7 @@ impl Clock {
             Direction::Backward => start.series_secs - first - passed,
         };
         let is_over = !(0.0..length).contains(&along) && passed > 0.0;
-        if is_over && !self.looped {
+        if is_over && self.repeat == Repeat::Once {
             self.stop();
             let end = if self.direction == Direction::Forward { times.len() - 1 } else { 0 };
             return Due::End(end);
@@ -180,7 +172,7 @@ mod tests {
         clock.play(0.0, 9, &times);
         assert_eq!(clock.due(0.05, 9, &times), Due::Step(0), "from the end it begins anew");
         assert_eq!(clock.due(1.05, 0, &times), Due::Same, "round once");
-        clock.looped = false;
+        clock.repeat = Repeat::Once;
         assert_eq!(clock.due(0.97, 8, &times), Due::Step(9), "the last");
         assert_eq!(clock.due(1.01, 9, &times), Due::End(9), "and the end");
         assert!(!clock.is_playing(), "it has stopped");

@@ -9,7 +9,7 @@ mod panel;
 use crate::host::context::ToolContext;
 use crate::host::tool::{Tool, ToolId};
 
-pub use clock::{Clock, Direction, Due};
+pub use clock::{Clock, Due};
 
 /// Play, stop, speed, loop, single steps and the time axis.
 #[derive(Debug, Default)]

@@ -2,11 +2,11 @@
 
 use egui::{Button, DragValue, RichText, Slider, Ui};
 
+use super::Player;
 use super::clock::{Due, SPEEDS};
-use super::{Direction, Player};
 use crate::case::{Edit, Volume};
 use crate::host::context::ToolContext;
-use crate::steps::Steps;
+use crate::steps::{Direction, Repeat, Steps};
 use crate::ui::theme;
 
 pub(super) fn show_ui(player: &mut Player, ctx: &mut ToolContext<'_>, ui: &mut Ui) {
@@ -99,7 +99,9 @@ fn buttons_ui(player: &mut Player, ui: &mut Ui, shown: usize, times: &[f64], now
                 .suffix(" ×"),
         );
         ui.checkbox(&mut back, "backwards");
-        ui.checkbox(&mut clock.looped, "loop");
+        let mut looped = clock.repeat == Repeat::Loop;
+        ui.checkbox(&mut looped, "loop");
+        clock.repeat = if looped { Repeat::Loop } else { Repeat::Once };
         let new_direction = if back { Direction::Backward } else { Direction::Forward };
         if new_speed != speed || new_direction != direction {
             clock.set_speed(new_speed, new_direction, now_secs, shown, times);
@@ -118,11 +120,16 @@ fn play(
     now_secs: f64,
 ) {
     let times = steps.times_secs();
-    let is_forward = player.clock.speed().1 == Direction::Forward;
+    let direction = player.clock.speed().1;
     match player.clock.due(now_secs, shown, times) {
         Due::Same => {}
-        Due::Step(due) | Due::End(due) => {
-            steps.want(due, is_forward, player.clock.looped);
+        // Where it stops, the last step is waited for.
+        Due::End(end) => {
+            player.clock.show(shown, end, times.len());
+            ctx.edit(Edit::SetStep { id: volume.id.clone(), step: end });
+        }
+        Due::Step(due) => {
+            steps.want(due, direction, player.clock.repeat);
             if steps.is_ready(due) {
                 player.clock.show(shown, due, times.len());
                 ctx.edit(Edit::SetStep { id: volume.id.clone(), step: due });

@@ -1,18 +1,11 @@
-//! Which byte codec suits a disk: measured on a payload, chosen for a reading speed.
+//! What the byte codecs make of a payload: bytes and time, measured, for whoever chooses between them.
 //!
-//! Reading and unpacking run side by side, so a chunk takes as long as the slower of the two: `packed bytes / disk
-//! speed` or `unpacking time / threads`. The codec with the shortest such time wins. Where several are as short, to
-//! [`AS_SHORT`], the disk is not what they wait for, and the smallest wins: it leaves the disk to others.
-//!
-//! A choice stands on time measured on this machine and may differ on the next run. A file is therefore written with
-//! a codec that is named; this module names it.
+//! Time is measured on this machine and may differ on the next run: a choice that stands on it is made once, and the
+//! file is written with a codec that is named.
 
 use std::time::Instant;
 
 use super::{ByteCodec, Form, PackError, PackOptions, Packer, Shape, UnpackError, Unpacker};
-
-/// Times that differ by less than this factor count as the same.
-pub const AS_SHORT: f64 = 1.02;
 
 /// Times a payload is unpacked; the shortest counts.
 const ROUNDS: usize = 5;
@@ -74,48 +67,9 @@ pub fn trials(payload: &[u8], shape: Shape, zstd_level: i32) -> Result<Vec<Trial
     Ok(trials)
 }
 
-/// The trial that plays fastest from such a disk: see the module. None if there are no trials.
-pub fn choose(trials: &[Trial], disk_bytes_per_sec: f64, threads: usize) -> Option<Trial> {
-    let secs = |trial: &Trial| trial.secs(disk_bytes_per_sec, threads);
-    let shortest = trials.iter().map(secs).fold(f64::INFINITY, f64::min);
-    let as_short = trials.iter().filter(|trial| secs(trial) <= shortest * AS_SHORT);
-    as_short.min_by_key(|trial| trial.packed_bytes).copied()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lossless::Planes;
-
-    fn trial(codec: ByteCodec, packed_bytes: usize, unpack_secs: f64) -> Trial {
-        let form = Form { codec, planes: Planes::AsIs };
-        Trial { form, payload_bytes: 1_000_000, packed_bytes, unpack_secs }
-    }
-
-    #[test]
-    fn a_slow_disk_wants_the_smallest_and_a_fast_one_the_quickest() {
-        let trials = [
-            trial(ByteCodec::Store, 1_000_000, 1e-4),
-            trial(ByteCodec::Lz4, 600_000, 5e-4),
-            trial(ByteCodec::Zstd, 400_000, 2e-3),
-        ];
-        let chosen = |disk, threads| choose(&trials, disk, threads).map(|trial| trial.form.codec);
-        assert_eq!(chosen(100e6, 1), Some(ByteCodec::Zstd), "100 MB/s: 4 ms of reading");
-        assert_eq!(chosen(1e9, 1), Some(ByteCodec::Lz4), "1 GB/s: zstd would take 2 ms, LZ4 takes 0.6 ms");
-        assert_eq!(chosen(1e9, 8), Some(ByteCodec::Zstd), "1 GB/s on 8 threads: zstd takes 0.4 ms");
-        assert_eq!(chosen(10e9, 1), Some(ByteCodec::Store), "10 GB/s: stored takes 0.1 ms, LZ4 0.5 ms");
-        assert_eq!(choose(&[], 1.0, 1), None, "nothing to choose from");
-    }
-
-    #[test]
-    fn where_times_are_the_same_the_smallest_is_chosen() {
-        let trials = [trial(ByteCodec::Lz4, 600_000, 0.1), trial(ByteCodec::Zstd, 400_000, 0.101)];
-        assert_eq!(
-            choose(&trials, 1e9, 1).map(|trial| trial.form.codec),
-            Some(ByteCodec::Zstd),
-            "within 2 %"
-        );
-    }
 
     #[test]
     fn a_payload_is_tried_with_every_codec() {

@@ -1,9 +1,8 @@
-//! Which layout, or packing, suits a series: measured on a sample of it, for a target.
+//! What layouts and packings make of a series, measured on a sample of it.
 //!
 //! [`similarity`] says how alike neighbours are in space and time, the two on which all these codecs live.
-//! [`measure`] then does not guess from it but encodes a sample with every [`Scheme`], and [`choose`] takes the best for
-//! a [`Target`]: a rate of pictures, a size, or a quality. What a lossless second stage makes of the bytes is asked of
-//! the caller, who has it.
+//! [`measure()`] then does not guess from it but encodes a sample with every [`Scheme`]. What a lossless second stage
+//! makes of the bytes is asked of the caller, who has it, and so is the choice.
 //!
 //! Source: *Yamada*, section 3 (a frame's time is that of its bytes, and a fixed rest) and table 4; *Nagayasu*,
 //! section 4 (where a second stage pays, and where TE or SE is better).
@@ -74,39 +73,6 @@ pub struct Candidate {
     pub bytes_per_step: f64,
     /// Peak signal-to-noise ratio on the sample, 255 to RMSE, in dB; infinite where nothing is lost.
     pub psnr_db: f64,
-}
-
-/// What is asked of a series.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Target {
-    /// At least this quality, in as few bytes as can be.
-    Psnr {
-        /// Peak signal-to-noise ratio in dB.
-        db: f64,
-    },
-    /// At most this size, at the best quality.
-    Bytes {
-        /// Bytes of a step.
-        per_step: f64,
-    },
-    /// At least this rate, at the best quality. A step takes its bytes over `bytes_per_second`, and `fixed_seconds`.
-    Fps {
-        /// Steps a second.
-        fps: f64,
-        /// What the slowest part of the way from disk to GPU carries.
-        bytes_per_second: f64,
-        /// What a step takes beside: decoding and drawing.
-        fixed_seconds: f64,
-    },
-}
-
-/// What [`choose`] found.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Choice {
-    /// The best candidate.
-    pub candidate: Candidate,
-    /// Whether it meets the target; if not, it is the one that comes nearest.
-    pub met: bool,
 }
 
 /// Why a sample cannot be measured.
@@ -197,34 +163,6 @@ pub fn measure(
     let sample = Sample::new(steps, extent);
     let schemes = schemes.into_iter().filter(|scheme| scheme.steps() <= steps.len());
     schemes.map(|scheme| sample.measure(scheme, extent, encoder, &second_stage)).collect()
-}
-
-/// The best of `candidates` for `target`; none if there are none.
-pub fn choose(candidates: &[Candidate], target: Target) -> Option<Choice> {
-    let by_bytes = |a: &&Candidate, b: &&Candidate| a.bytes_per_step.total_cmp(&b.bytes_per_step);
-    let by_psnr = |a: &&Candidate, b: &&Candidate| a.psnr_db.total_cmp(&b.psnr_db);
-    // Of equals, the better or smaller.
-    let smallest = |a: &&Candidate, b: &&Candidate| by_bytes(a, b).then(by_psnr(b, a));
-    let best = |a: &&Candidate, b: &&Candidate| by_psnr(a, b).then(by_bytes(b, a));
-    let (met, nearest) = match target {
-        Target::Psnr { db } => {
-            let met = candidates.iter().filter(|candidate| candidate.psnr_db >= db).min_by(smallest);
-            (met, candidates.iter().max_by(best))
-        }
-        Target::Bytes { .. } | Target::Fps { .. } => {
-            let most = match target {
-                Target::Bytes { per_step } => per_step,
-                Target::Fps { fps, bytes_per_second, fixed_seconds } => {
-                    (1.0 / fps - fixed_seconds) * bytes_per_second
-                }
-                Target::Psnr { .. } => f64::INFINITY,
-            };
-            let met = candidates.iter().filter(|candidate| candidate.bytes_per_step <= most).max_by(best);
-            (met, candidates.iter().min_by(smallest))
-        }
-    };
-    let candidate = met.or(nearest)?;
-    Some(Choice { candidate: *candidate, met: met.is_some() })
 }
 
 /// Boxes from all over a series, one behind the other along y, as a small series.

@@ -1,7 +1,7 @@
-//! The choice of a scheme: similarity against closed forms, sizes that are exact, targets that are met or said not to be.
+//! What schemes make of a sample: similarity against closed forms, sizes that are exact.
 
 use compress::Extent3;
-use compress::pvtc::choose::{Candidate, Scheme, Target, choose, measure, similarity};
+use compress::pvtc::measure::{Scheme, measure, similarity};
 use compress::pvtc::packed::Packing;
 use compress::pvtc::{Encoder, Layout, decode_step, encode};
 use compress::quality;
@@ -84,59 +84,6 @@ fn a_sample_of_a_large_series_is_near_the_whole_also_where_boxes_do_not_divide_i
         let exact = quality::compare(&steps.concat(), &copy, 255.0).unwrap().psnr_db;
         assert!((sampled.psnr_db - exact).abs() < 0.1, "{sizes:?}: {} for {exact}", sampled.psnr_db);
     }
-}
-
-#[test]
-fn longer_groups_are_chosen_where_time_is_alike_and_shorter_where_it_is_not() {
-    let extent = extent([64, 48, 24]);
-    let chosen = |noise_in_time: bool, target: Target| {
-        let steps = series(extent, noise_in_time);
-        let candidates =
-            measure(&borrowed(&steps), extent, Scheme::all(), Encoder::Fitted, |_, bytes| bytes.len())
-                .unwrap();
-        choose(&candidates, target).unwrap()
-    };
-    // A still series loses little by long groups, so that the quality comes in fewer bytes.
-    let (still, moving) = (chosen(false, Target::Psnr { db: 37.0 }), chosen(true, Target::Psnr { db: 37.0 }));
-    assert!(still.met && moving.met, "{still:?} {moving:?}");
-    assert!(still.candidate.scheme.steps() > moving.candidate.scheme.steps(), "{still:?} {moving:?}");
-    assert!(still.candidate.bytes_per_step < moving.candidate.bytes_per_step, "{still:?} {moving:?}");
-    // The same size holds more of it.
-    let size = Target::Bytes { per_step: 0.17 * extent.voxels() as f64 };
-    let (still, moving) = (chosen(false, size), chosen(true, size));
-    assert!(still.met && still.candidate.psnr_db > moving.candidate.psnr_db, "{still:?} {moving:?}");
-}
-
-#[test]
-fn the_target_is_met_by_the_best_and_where_none_does_the_nearest_is_named_as_such() {
-    let candidate = |s, t, bytes_per_step, psnr_db| Candidate {
-        scheme: Scheme::Layout(Layout::new(s, t).unwrap()),
-        bytes_per_step,
-        psnr_db,
-    };
-    // Yamada, tables 1 and 5, turbulence, of 1000 bytes a step.
-    let [a, b, c, d] = [
-        candidate(4, 3, 104.0, 31.5),
-        candidate(4, 2, 156.0, 39.2),
-        candidate(1, 3, 167.0, 31.8),
-        candidate(1, 2, 250.0, 40.9),
-    ];
-    let all = [a, b, c, d];
-    let check = |target: Target, expected: Candidate, met: bool| {
-        let choice = choose(&all, target).unwrap();
-        assert_eq!((choice.candidate, choice.met), (expected, met), "{target:?}");
-    };
-    check(Target::Psnr { db: 31.6 }, b, true);
-    check(Target::Psnr { db: 30.0 }, a, true);
-    check(Target::Psnr { db: 50.0 }, d, false);
-    check(Target::Bytes { per_step: 200.0 }, b, true);
-    check(Target::Bytes { per_step: 50.0 }, a, false);
-    // 20 a second leave 50 ms, 30 of them for 3000 bytes a second: 90 bytes; 10 leave 80 ms, 240 bytes.
-    let fps = |fps| Target::Fps { fps, bytes_per_second: 3000.0, fixed_seconds: 0.02 };
-    check(fps(20.0), a, false);
-    check(fps(10.0), b, true);
-    check(fps(60.0), a, false);
-    assert_eq!(choose(&[], fps(10.0)), None, "nothing to choose from");
 }
 
 #[test]
