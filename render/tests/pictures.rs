@@ -320,6 +320,7 @@ fn lossy_textures_state_their_error_and_stay_near() {
     for (format, psnr_db) in [
         (TextureFormat::Bc4, 45.0),
         (TextureFormat::Bc5, 52.0),
+        (TextureFormat::Bc7, 30.0),
         (TextureFormat::Rgba8, 30.0),
         (TextureFormat::Bc3, 28.0),
     ] {

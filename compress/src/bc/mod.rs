@@ -271,7 +271,7 @@ pub fn decode_volume(format: BlockFormat, blocks: &[u8], extent: Extent3) -> Res
     Ok(samples)
 }
 
-/// Encodes a row of blocks of colours, BC3 or else BC1: `rows` are four rows of 4·n voxels.
+/// Encodes a row of blocks of colours, BC3 or BC7, or else BC1: `rows` are four rows of 4·n voxels.
 pub(crate) fn encode_colours(
     format: BlockFormat,
     rows: [&[[u8; 4]]; 4],
@@ -280,6 +280,7 @@ pub(crate) fn encode_colours(
 ) {
     match format {
         BlockFormat::Bc3 => bc3::encode_row(rows, blocks, options),
+        BlockFormat::Bc7 => bc7::encode_row(rows, blocks, options),
         _ => bc1::encode_row(rows, blocks, options),
     }
 }
@@ -289,12 +290,18 @@ pub(crate) fn encode_scalars(rows: [&[u8]; 4], blocks: &mut [u8], options: Encod
     bc4::encode_row(rows, blocks, options);
 }
 
-/// Decodes a block of colours, BC3 if it has 16 bytes, else BC1.
-pub(crate) fn decode_colours(block: &[u8]) -> [[u8; 4]; 16] {
-    match (block.first_chunk(), block.first_chunk()) {
-        (Some(block), _) => bc3::decode(*block),
-        (None, Some(block)) => bc1::decode(*block),
-        (None, None) => [[0; 4]; 16],
+/// The block of BC7 of one colour, exactly.
+pub(crate) fn bc7_constant(texel: [u8; 4]) -> [u8; 16] {
+    bc7::constant(texel)
+}
+
+/// Decodes a block of colours, BC3 or BC7 if it has 16 bytes, else BC1.
+pub(crate) fn decode_colours(format: BlockFormat, block: &[u8]) -> [[u8; 4]; 16] {
+    match (format, block.first_chunk(), block.first_chunk()) {
+        (BlockFormat::Bc7, Some(block), _) => bc7::decode(*block),
+        (_, Some(block), _) => bc3::decode(*block),
+        (_, None, Some(block)) => bc1::decode(*block),
+        (_, None, None) => [[0; 4]; 16],
     }
 }
 

@@ -168,7 +168,7 @@ impl Iterator for Spans<'_> {
     }
 }
 
-/// Encodes the colours of a part as BC3, or as BC1 if a block has 8 bytes.
+/// Encodes the colours of a part as BC3 or BC7, or as BC1 if a block has 8 bytes.
 pub(super) fn colours<const BYTES: usize>(
     job: &Job<'_>,
     table: &ColourTable,
@@ -205,7 +205,8 @@ fn colour_task<const BYTES: usize>(
         for (span, run) in job.spans([x, y, z], &mut scratch.known) {
             let at = begin + span.start;
             if let Some(run) = run {
-                task.blocks[at..at + span.len()].fill(table.constant(run).block());
+                let constant = task.constant(run);
+                task.blocks[at..at + span.len()].fill(constant);
                 task.stats.skipped += span.len() as u64;
             } else {
                 let from = [x + span.start, y, z];
@@ -241,8 +242,15 @@ impl<const BYTES: usize> ColourTask<'_, BYTES> {
         let Ranges { low, high, all } = group.ranges;
         if let Some(run) = self.table.run(*all) {
             let constant = self.table.constant(run);
-            self.blocks[at..at + count].fill(constant.block());
+            let block = self.constant(run);
+            self.blocks[at..at + count].fill(block);
             *(if constant.clear { &mut self.stats.clear } else { &mut self.stats.solid }) += count as u64;
+            return;
+        }
+        if self.format == BlockFormat::Bc7 {
+            for i in 0..count {
+                self.accurate(group, i, [low[i], high[i]], at + i);
+            }
             return;
         }
         // Without branches, since here nothing is likely: each block becomes a constant, and those that are none are
@@ -262,6 +270,27 @@ impl<const BYTES: usize> ColourTask<'_, BYTES> {
         for i in &mixed[..mixed_count] {
             let i = i & (GROUP - 1);
             self.mixed(group, i, [low[i], high[i]], at + i);
+        }
+    }
+
+    /// The constant block of a run in this task's format.
+    fn constant(&self, run: u16) -> [u8; BYTES] {
+        let mut block = [0; BYTES];
+        match self.format {
+            BlockFormat::Bc7 => block.copy_from_slice(&self.table.accurate()[usize::from(run)]),
+            _ => block = self.table.constant(run).block(),
+        }
+        block
+    }
+
+    /// Encodes block `i` of a group in BC7, as block `at` of the output: beside what its kernel takes, nothing costs.
+    fn accurate(&mut self, group: Group<'_>, i: usize, range: [u16; 2], at: usize) {
+        if let Some(run) = self.table.run(range) {
+            self.blocks[at] = self.constant(run);
+            let clear = self.table.constant(run).clear;
+            *(if clear { &mut self.stats.clear } else { &mut self.stats.solid }) += 1;
+        } else if self.colours.push(group, i, at, |index| self.table.texels()[usize::from(index)]) {
+            self.flush_colours();
         }
     }
 

@@ -96,14 +96,14 @@ impl<'a> ColourErrors<'a> {
             format,
             truth,
             constant: Vec::with_capacity(table.truth().len()),
-            exact: vec![true; table.constants().len()],
+            exact: vec![true; table.runs_count()],
         };
         let mut decoded = None;
         for index in 0..=table.domain().last() {
             let run = table.run([index; 2]).unwrap_or_default();
             let texel = match decoded {
                 Some((of, texel)) if of == run => texel,
-                _ => errors.decode(table.constants()[usize::from(run)].bytes(format))[0],
+                _ => errors.decode(table.constant_bytes(run.into(), format))[0],
             };
             decoded = Some((run, texel));
             let error = errors.error(index, texel);
@@ -123,7 +123,7 @@ impl Errors for ColourErrors<'_> {
     }
 
     fn decode(&self, block: &[u8]) -> [[u8; 4]; VOXELS] {
-        bc::decode_colours(block)
+        bc::decode_colours(self.format, block)
     }
 
     #[inline(always)]
@@ -138,7 +138,7 @@ impl Errors for ColourErrors<'_> {
 
     fn known(&self, range: [u16; 2], block: &[u8]) -> Known<'_> {
         match self.table.run(range).map(usize::from) {
-            Some(run) if block != self.table.constants()[run].bytes(self.format) => Known::Nothing,
+            Some(run) if block != self.table.constant_bytes(run, self.format) => Known::Nothing,
             Some(run) if self.exact[run] => Known::Exact,
             Some(_) => Known::ByIndex(&self.constant),
             None => Known::Nothing,

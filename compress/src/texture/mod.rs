@@ -132,7 +132,7 @@ pub enum TextureError {
 #[derive(Debug, Clone, Copy)]
 pub enum Mapping<'a> {
     /// Colours and opacities: for [`TexelFormat::Rgba8`], [`BlockFormat::Bc1`] (opaque tables only),
-    /// [`BlockFormat::Bc3`].
+    /// [`BlockFormat::Bc3`], [`BlockFormat::Bc7`].
     Colours(&'a ColourTable),
     /// Scalars: for [`TexelFormat::R8`], [`TexelFormat::R16`], [`BlockFormat::Bc4`].
     Scalars(&'a Window),
@@ -381,7 +381,9 @@ impl<'a> Source<'a> {
         let job = Job { volume: self.volume, part, skip: self.skip.as_ref(), options, simd: self.simd };
         Ok(match (format, self.mapping) {
             (BlockFormat::Bc1, Mapping::Colours(table)) => encode::colours::<8>(&job, table, format, out),
-            (BlockFormat::Bc3, Mapping::Colours(table)) => encode::colours::<16>(&job, table, format, out),
+            (BlockFormat::Bc3 | BlockFormat::Bc7, Mapping::Colours(table)) => {
+                encode::colours::<16>(&job, table, format, out)
+            }
             (BlockFormat::Bc4, Mapping::Scalars(window)) => encode::scalars(&job, window, out),
             _ => return Err(TextureError::Mapping),
         })
@@ -390,7 +392,8 @@ impl<'a> Source<'a> {
     fn check_mapping(&self, format: BlockFormat) -> Result<(), TextureError> {
         let suits = match (format, self.mapping) {
             (BlockFormat::Bc1, Mapping::Colours(table)) => table.is_opaque(),
-            (BlockFormat::Bc3, Mapping::Colours(_)) | (BlockFormat::Bc4, Mapping::Scalars(_)) => true,
+            (BlockFormat::Bc3 | BlockFormat::Bc7, Mapping::Colours(_))
+            | (BlockFormat::Bc4, Mapping::Scalars(_)) => true,
             _ => false,
         };
         if suits { Ok(()) } else { Err(TextureError::Mapping) }

@@ -1,5 +1,7 @@
 //! What a stored sample becomes: a colour and an opacity, or a number of 8 or 16 bits.
 
+use std::sync::OnceLock;
+
 use super::TextureError;
 use super::domain::{Domain, SampleKind};
 use crate::bc::EncodeOptions;
@@ -55,6 +57,8 @@ pub struct ColourTable {
     unit: i64,
     /// By run: its constant block.
     constants: Vec<Constant>,
+    /// By run: its constant block in BC7.
+    accurate: OnceLock<Vec<[u8; 16]>>,
 }
 
 /// A block all of whose values are in one run.
@@ -62,6 +66,8 @@ pub struct ColourTable {
 pub(super) struct Constant {
     /// Whether it is not seen.
     pub(super) clear: bool,
+    /// Its colour and opacity.
+    texel: [u8; 4],
     /// Its bytes as BC3; the last 8 are BC1.
     block: [u8; 16],
 }
@@ -71,11 +77,6 @@ impl Constant {
     #[inline(always)]
     pub(super) fn block<const BYTES: usize>(&self) -> [u8; BYTES] {
         std::array::from_fn(|i| self.block[16 - BYTES + i])
-    }
-
-    /// The bytes in a format of colours.
-    pub(super) fn bytes(&self, format: BlockFormat) -> &[u8] {
-        &self.block[16 - format.block_bytes().min(16)..]
     }
 }
 
@@ -131,6 +132,7 @@ impl ColourTable {
             colours: entries(),
             unit: 0,
             constants: Vec::new(),
+            accurate: OnceLock::new(),
         };
         table.sample(points);
         table.find_runs();
@@ -199,9 +201,22 @@ impl ColourTable {
         &self.constants[usize::from(run)]
     }
 
-    /// The constant block of each run.
-    pub(super) fn constants(&self) -> &[Constant] {
-        &self.constants
+    /// How many runs there are.
+    pub(super) fn runs_count(&self) -> usize {
+        self.constants.len()
+    }
+
+    /// The constant block of each run in BC7, made when it is first asked for.
+    pub(super) fn accurate(&self) -> &[[u8; 16]] {
+        self.accurate.get_or_init(|| self.constants.iter().map(|c| bc::bc7_constant(c.texel)).collect())
+    }
+
+    /// The constant block of a run in a format of colours.
+    pub(super) fn constant_bytes(&self, run: usize, format: BlockFormat) -> &[u8] {
+        match format {
+            BlockFormat::Bc7 => &self.accurate()[run],
+            _ => &self.constants[run].block[16 - format.block_bytes().min(16)..],
+        }
     }
 
     /// Fills in the colours of all indices, piece by piece.
@@ -251,7 +266,7 @@ impl ColourTable {
             let mut block = [0; 16];
             let rows = [[texel; 4]; 4];
             bc::encode_colours(BlockFormat::Bc3, rows.each_ref().map(|row| &row[..]), &mut block, options);
-            self.constants.push(Constant { clear, block });
+            self.constants.push(Constant { clear, texel, block });
             for (colour, own) in self.colours[start..end].iter_mut().zip(run) {
                 *colour = if clear { texel } else { *own };
             }

@@ -132,6 +132,8 @@ fn nothing_that_only_saves_time_changes_a_byte() {
     let formats = [
         (BlockFormat::Bc3, Mapping::Colours(&table), Level::Fast),
         (BlockFormat::Bc3, Mapping::Colours(&table), Level::Best),
+        (BlockFormat::Bc7, Mapping::Colours(&table), Level::Fast),
+        (BlockFormat::Bc7, Mapping::Colours(&table), Level::Best),
         (BlockFormat::Bc4, Mapping::Scalars(&window), Level::Best),
     ];
     for (format, mapping, level) in formats {
@@ -199,11 +201,12 @@ fn the_loss_is_that_of_the_decoded_texture() {
     let (samples, table) = (hounsfield(), table());
     let volume = Volume::new(Samples::I16(&samples), extent(SIZES)).unwrap();
     let source = Source::new(volume, Mapping::Colours(&table)).unwrap();
-    for level in [Level::Fast, Level::Best] {
-        let (blocks, _) = source.blocks(BlockFormat::Bc3, options(level)).unwrap();
-        let decoded = decode_volume(BlockFormat::Bc3, &blocks, extent(SIZES)).unwrap();
+    let both = [Level::Fast, Level::Best];
+    for (format, level) in both.into_iter().flat_map(|l| [(BlockFormat::Bc3, l), (BlockFormat::Bc7, l)]) {
+        let (blocks, _) = source.blocks(format, options(level)).unwrap();
+        let decoded = decode_volume(format, &blocks, extent(SIZES)).unwrap();
         let (largest, squares) = premultiplied_error(&samples, &decoded);
-        let loss = source.loss_of_blocks(BlockFormat::Bc3, &blocks).unwrap();
+        let loss = source.loss_of_blocks(format, &blocks).unwrap();
         assert!((loss.largest - largest).abs() < 1e-3, "largest {} {largest}", loss.largest);
         assert!((loss.squares / squares - 1.0).abs() < 1e-4, "squares {} {squares}", loss.squares);
         assert_eq!(loss.samples, 4 * samples.len() as u64, "four a voxel");

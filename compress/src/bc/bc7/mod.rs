@@ -30,3 +30,8 @@ mod split;
 
 pub(super) use decode::decode;
 pub(super) use encode::encode_row;
+
+/// The block of one colour, exactly.
+pub(super) fn constant(texel: [u8; 4]) -> [u8; 16] {
+    pack::Content::solid(texel).pack()
+}
