@@ -309,7 +309,9 @@ fn numbered_volumes(folder: &Path) {
         };
         for i in 0..24 * 20 * 16 {
             let (x, y, z) = (i % 24, i / 24 % 20, i / 480);
-            file.push(if inside(x, y, z) { 200 + (i % 7) as u8 } else { 20 + step });
+            let mixed = (i as u32 + 7680 * u32::from(step)).wrapping_mul(0x9E37_79B9);
+            let noise = (mixed ^ mixed >> 15).wrapping_mul(0x85EB_CA6B) >> 28;
+            file.push(noise as u8 + if inside(x, y, z) { 200 } else { 20 + step });
         }
         std::fs::write(folder.join(format!("beat_{step:02}.nrrd")), file).expect("written");
     }
@@ -339,7 +341,7 @@ fn numbered_volumes_become_a_series_file_that_states_its_error_and_is_drawn() {
     assert_eq!((&stats["steps"], &stats["codec"]), (&json!(12), &json!("pvtc <4,3>")), "{stats}");
     assert_eq!(stats["payload_bytes"], json!(4 * 6 * 5 * 4 * 20), "5/48 of the samples: known beforehand");
     let largest = stats["largest_value_error"].as_f64().expect("an error");
-    assert!(largest > 0.0 && stats["psnr_db"].as_f64().is_some_and(|p| p > 30.0), "{stats}");
+    assert!(largest > 0.0 && stats["psnr_db"].as_f64().is_some_and(|p| p > 25.0), "{stats}");
 
     let info = osteotome(&["info", text(&series), "--json"]);
     assert_eq!(info.code(), 0, "{}", info.stderr);
@@ -374,9 +376,9 @@ fn numbered_volumes_become_a_series_file_that_states_its_error_and_is_drawn() {
         "drawn from its compressed bytes: {stats}"
     );
     let (last, _) = picture(11, "gpu");
-    assert!(difference(&first, &last).max > 40.0, "the box has moved");
+    assert!(difference(&first, &last).1 > 40, "the box has moved");
     let (truth, _) = picture(11, "reference");
-    assert!(difference(&last, &truth).max <= 4.0, "as the reference draws the decoded samples");
+    assert!(difference(&last, &truth).1 <= 4, "as the reference draws the decoded samples");
 }
 
 #[test]

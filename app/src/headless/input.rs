@@ -64,7 +64,21 @@ pub fn of_source(source: &Source) -> Result<Input, Failure> {
     for (i, volume) in case.volumes.iter_mut().enumerate() {
         volume.visible = Some(i) == largest;
     }
+    check_steps(&case, &assets)?;
     Ok(Input { case, assets })
+}
+
+/// A step that cannot be read would be left out of the picture: that is no picture of the case.
+fn check_steps(case: &Case, assets: &Assets) -> Result<(), Failure> {
+    for volume in case.volumes.iter().filter(|v| v.visible) {
+        if let Some(steps) = assets.steps(volume)
+            && assets.grid(volume).is_none()
+        {
+            let fault = steps.fault().unwrap_or_else(|| "a step cannot be read".to_owned());
+            return Err(Failure::Unfit(format!("step {} of \"{}\": {fault}", volume.step, volume.id)));
+        }
+    }
+    Ok(())
 }
 
 /// The built-in sample case.
@@ -78,6 +92,7 @@ pub fn builtin() -> Result<Input, Failure> {
 fn load(case: Case) -> Result<Input, Failure> {
     let mut assets = Assets::default();
     assets.load_missing(&case, &Limits::default(), &Terminal::default())?;
+    check_steps(&case, &assets)?;
     Ok(Input { case, assets })
 }
 

@@ -176,6 +176,7 @@ impl Host {
         let now_secs = ctx.input(|i| i.time);
         let mut wishes = Wishes::default();
         self.session.tick(now_secs);
+        self.session.complain_of_steps();
         if self.session.replaced() != self.replaced {
             self.replaced = self.session.replaced();
             self.views = Views::new();

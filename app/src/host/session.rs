@@ -140,6 +140,15 @@ impl Session {
         }
     }
 
+    /// Says what went wrong with volumes over time that are read as they play.
+    pub fn complain_of_steps(&mut self) {
+        let moving = self.history.case().volumes.iter().filter_map(|v| self.assets.steps(v));
+        let faults: Vec<String> = moving.filter_map(|steps| steps.take_fault()).collect();
+        for fault in faults {
+            self.complain(fault);
+        }
+    }
+
     /// Changes the case; a refusal becomes a [`Problem`].
     pub fn edit(&mut self, edit: Edit, now_secs: f64) {
         if let Edit::SetVolumeVisible { visible: true, .. } | Edit::SetImplantVisible { visible: true, .. } =

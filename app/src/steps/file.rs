@@ -126,6 +126,10 @@ impl SeriesFile {
         self.playing().fault.clone()
     }
 
+    pub(super) fn take_fault(&self) -> Option<String> {
+        self.playing().fault.take()
+    }
+
     pub(super) fn description(&self) -> String {
         let Header { codec, byte_codec, .. } = self.header;
         let lost = match (self.figures.largest_error, self.figures.psnr_db) {

@@ -121,6 +121,14 @@ impl Steps {
         }
     }
 
+    /// The same, and forgets it: for whoever has shown it.
+    pub fn take_fault(&self) -> Option<String> {
+        match &self.source {
+            Source::Memory(_) => None,
+            Source::File(file) => file.take_fault(),
+        }
+    }
+
     /// Where the steps are and what was lost, for people.
     pub fn description(&self) -> String {
         match &self.source {

@@ -145,7 +145,4 @@ fn facts_ui(player: &Player, ui: &mut Ui, steps: &Steps, now_secs: f64) {
         theme::quiet_ui(ui, format!("{rate:.1} steps a second; {shown} shown, {dropped} dropped"));
     }
     theme::quiet_ui(ui, steps.description());
-    if let Some(fault) = steps.fault() {
-        ui.label(RichText::new(fault).color(theme::FAULT));
-    }
 }
