@@ -129,18 +129,18 @@ fn choose(steps: &Steps, args: &CompressArgs) -> Result<(SeriesOptions, Value), 
 }
 
 /// Sends steps to a device and says how long they take.
-pub(super) struct Sender<'a> {
+struct Sender<'a> {
     renderer: Renderer,
     bytes: &'a Bytes,
 }
 
 impl<'a> Sender<'a> {
-    pub(super) fn new(gpu: &Arc<Gpu>, bytes: &'a Bytes) -> Result<Self, Failure> {
+    fn new(gpu: &Arc<Gpu>, bytes: &'a Bytes) -> Result<Self, Failure> {
         Ok(Self { renderer: Renderer::new(Arc::clone(gpu))?, bytes })
     }
 
     /// Seconds of one step of a payload, from its bytes to a texture that can be drawn.
-    pub(super) fn secs(&mut self, codec: StepCodec, payload: Vec<u8>) -> Result<f64, String> {
+    fn secs(&mut self, codec: StepCodec, payload: Vec<u8>) -> Result<f64, String> {
         let count = usize::from(codec.steps_per_chunk());
         let header = self.bytes.header(codec);
         let payload = Arc::new(payload);
@@ -217,6 +217,19 @@ impl Bytes {
         }
         let place = *first.world_from_voxel() * shrink(enlarge);
         Ok(Self { extent, steps: all, times_secs, quantiser, place })
+    }
+
+    /// The first steps of these.
+    pub(super) fn first(&self, count: usize) -> Self {
+        let count = count.min(self.steps.len());
+        let Self { extent, quantiser, place, .. } = *self;
+        Self {
+            extent,
+            steps: self.steps[..count].to_vec(),
+            times_secs: self.times_secs[..count].to_vec(),
+            quantiser,
+            place,
+        }
     }
 
     pub(super) fn voxels(&self) -> f64 {
