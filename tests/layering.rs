@@ -78,6 +78,7 @@ fn rules() -> Vec<Rule> {
                 "app/src/jobs",
                 "app/src/sample/",
                 "app/src/save/",
+                "app/src/steps/",
             ],
             &[],
             all(&[&UI, &FORMATS, &["wgpu", "naga", "crate::host", "crate::tools", "crate::ui"]]),

@@ -243,8 +243,13 @@ pub fn open(
             let name = if name.is_empty() { source.short_name() } else { name.to_owned() };
             let modality = Some(kind.to_owned()).filter(|kind| !kind.is_empty());
             let key = Key { source: source.clone(), kind: Kind::Volume, item: 0 };
+            let mut notes = Vec::new();
+            if steps.is_lossy() {
+                let text = format!("Values differ from the original's: {}.", steps.description());
+                notes.push(Note { severity: load::Severity::Caution, code: "series.lossy", text });
+            }
             let data = Data::Steps(Arc::new(steps));
-            Ok(vec![Arc::new(Asset { key, name, format: "series", modality, data, notes: Vec::new() })])
+            Ok(vec![Arc::new(Asset { key, name, format: "series", modality, data, notes })])
         }
         Source::Path(path) => Ok(number(source, load::open(path, limits, progress)?)),
         Source::Builtin(name) => {

@@ -120,6 +120,7 @@ pub(super) fn figures(stats: &Stats, map: &mut Map<String, Value>) {
         "fragments_skipped": stats.fragments_skipped,
         "bricks": stats.bricks,
         "bricks_skipped": stats.bricks_skipped,
+        "textures_sent": stats.textures_sent,
         "off_screen_skipped": stats.off_screen_skipped,
         "saturate_looks": stats.saturate_looks,
         "layers": stats.layers,

@@ -623,7 +623,14 @@ fn names(case: &Case, loaded: &assets::Assets) -> Vec<(String, &'static str)> {
         let grid = loaded.grid(volume)?;
         let modality = loaded.asset(&assets::Key::of_volume(volume)).and_then(|a| a.modality.clone());
         let is_ct = modality.map_or(grid.range()[0] < views::AIR_BELOW, |m| m == "CT");
-        Some((volume.id.clone(), if is_ct { " HU" } else { "" }))
+        let is_lossy = loaded.steps(volume).is_some_and(|steps| steps.is_lossy());
+        let unit = match (is_ct, is_lossy) {
+            (true, false) => " HU",
+            (true, true) => " HU (lossy)",
+            (false, true) => " (lossy)",
+            (false, false) => "",
+        };
+        Some((volume.id.clone(), unit))
     });
     named.collect()
 }

@@ -126,6 +126,10 @@ impl SeriesFile {
         self.playing().fault.clone()
     }
 
+    pub(super) fn is_lossy(&self) -> bool {
+        self.figures.largest_error != Some(0.0)
+    }
+
     pub(super) fn take_fault(&self) -> Option<String> {
         self.playing().fault.take()
     }

@@ -129,6 +129,14 @@ impl Steps {
         }
     }
 
+    /// Whether the values may differ from those that were compressed.
+    pub fn is_lossy(&self) -> bool {
+        match &self.source {
+            Source::Memory(_) => false,
+            Source::File(file) => file.is_lossy(),
+        }
+    }
+
     /// Where the steps are and what was lost, for people.
     pub fn description(&self) -> String {
         match &self.source {
