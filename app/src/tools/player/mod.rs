@@ -1,4 +1,4 @@
-//! Plays a volume over time: which step is due is [`clock`]'s, the panel draws and asks.
+//! Plays a volume over time: which step is due is `clock`'s, the panel draws and asks.
 //!
 //! A step is shown when it is there: a step that is due but not read yet is waited for, and what the clock passed
 //! over meanwhile is counted as dropped.

@@ -74,13 +74,13 @@ const fn mode(numbers: [u32; 8], low_bits: LowBits) -> Mode {
     }
 }
 
-/// The share of the second end point, in 64ths, of an index of `bits` bits: what the standard's table rounds.
+/// The share of the second end point, in parts of 64, of an index of `bits` bits: what the standard's table rounds.
 pub(super) fn weight(bits: u32, index: u32) -> u32 {
     let last = (1 << bits) - 1;
     (128 * index + last) / (2 * last)
 }
 
-/// The value at `weight` 64ths from `a` to `b`.
+/// The value at `weight` parts of 64 from `a` to `b`.
 pub(super) fn interpolate(a: u32, b: u32, weight: u32) -> u8 {
     (((64 - weight) * a + weight * b + 32) >> 6) as u8
 }
