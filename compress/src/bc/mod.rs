@@ -151,6 +151,16 @@ pub enum EncodeError {
         /// Bytes given.
         found: usize,
     },
+    /// The place for the blocks is not of their size.
+    #[error("a place of {found} bytes was given, but the blocks of this extent as {} have {expected}: give as many", .format.name())]
+    Place {
+        /// The format.
+        format: BlockFormat,
+        /// Bytes of the blocks.
+        expected: usize,
+        /// Bytes given.
+        found: usize,
+    },
     /// There is no memory for the blocks.
     #[error("no memory for {bytes} bytes of blocks: close other volumes or encode a part")]
     OutOfMemory {
@@ -202,25 +212,44 @@ pub fn encode_volume_with(
     extent: Extent3,
     options: EncodeOptions,
 ) -> Result<Vec<u8>, EncodeError> {
+    let bytes = format.encoded_len(extent);
+    let mut blocks = zeroed(bytes).ok_or(EncodeError::OutOfMemory { bytes })?;
+    encode_volume_into(format, samples, extent, options, &mut blocks)?;
+    Ok(blocks)
+}
+
+/// Encodes a volume over the blocks of an old one, see [`encode_volume`].
+///
+/// # Errors
+/// [`EncodeError::Length`] as there; [`EncodeError::Place`] if `blocks` has not [`BlockFormat::encoded_len`] bytes.
+pub fn encode_volume_into(
+    format: BlockFormat,
+    samples: &[u8],
+    extent: Extent3,
+    options: EncodeOptions,
+    blocks: &mut [u8],
+) -> Result<(), EncodeError> {
     let expected = format.decoded_len(extent);
     if samples.len() != expected {
         return Err(EncodeError::Length { format, expected, found: samples.len() });
     }
-    let bytes = format.encoded_len(extent);
-    let mut blocks = zeroed(bytes).ok_or(EncodeError::OutOfMemory { bytes })?;
+    let expected = format.encoded_len(extent);
+    if blocks.len() != expected {
+        return Err(EncodeError::Place { format, expected, found: blocks.len() });
+    }
     match format {
-        BlockFormat::Bc1 => block::encode(samples, extent, &mut blocks, bc1::encode),
+        BlockFormat::Bc1 => block::encode(samples, extent, blocks, bc1::encode),
         BlockFormat::Bc3 => {
-            block::encode(samples, extent, &mut blocks, |texels| bc3::encode(texels, options.colour_weight));
+            block::encode(samples, extent, blocks, |texels| bc3::encode(texels, options.colour_weight));
         }
-        BlockFormat::Bc4 => block::encode(samples, extent, &mut blocks, bc4::encode),
+        BlockFormat::Bc4 => block::encode(samples, extent, blocks, bc4::encode),
         BlockFormat::Bc7 => {
-            block::encode_rows(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+            block::encode_rows(samples, extent, blocks, format.block_bytes(), |rows, blocks| {
                 bc7::encode_row(rows, blocks, options);
             });
         }
     }
-    Ok(blocks)
+    Ok(())
 }
 
 /// Decodes a volume: the inverse of [`encode_volume`], for blocks of any encoder.
