@@ -194,7 +194,7 @@ fn pack(c0: u16, c1: u16, indices: u32) -> [u8; 8] {
 }
 
 /// The block nearest to a single colour: index 2 of the best pair of end points in each channel.
-fn solid(colour: [u8; 3]) -> [u8; 8] {
+pub(super) fn solid(colour: [u8; 3]) -> [u8; 8] {
     let tables = [&SOLID_5, &SOLID_6, &SOLID_5];
     let pairs = [0, 1, 2].map(|c: usize| tables[c][usize::from(colour[c])]);
     let ends = [pairs.map(|[a, _]| u32::from(a)), pairs.map(|[_, b]| u32::from(b))];

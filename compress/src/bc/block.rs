@@ -50,13 +50,12 @@ pub(super) fn encode<const N: usize, const BYTES: usize>(
 
 /// Encodes all blocks of a volume by whole rows: four rows of voxels, the last repeated past the far edge in y.
 pub(super) fn encode_rows<const N: usize>(
-    samples: &[u8],
+    voxels: &[[u8; N]],
     extent: Extent3,
     blocks: &mut [u8],
     block_bytes: usize,
     encode_row: impl Fn([&[[u8; N]]; EDGE], &mut [u8]) + Sync,
 ) {
-    let (voxels, _) = samples.as_chunks::<N>();
     let [blocks_x, blocks_y, _] = extent.blocks();
     blocks.par_chunks_mut(blocks_x * block_bytes).enumerate().for_each(|(row, blocks)| {
         let (z, block_y) = (row / blocks_y, row % blocks_y);

@@ -18,16 +18,21 @@
 //!
 //! Source: KDFS, chapters "S3TC Compressed Texture Image Formats" and "RGTC Compressed Texture Image Formats".
 
+mod batch;
 mod bc1;
 mod bc3;
 mod bc4;
 mod bc7;
 mod block;
+mod colour;
 mod endpoints;
+mod rows;
+mod scalar;
 
 use thiserror::Error;
 
 use crate::Extent3;
+use crate::simd::Simd;
 
 /// A block format. The set is closed: its members stand in files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -237,19 +242,29 @@ pub fn encode_volume_into(
     if blocks.len() != expected {
         return Err(EncodeError::Place { format, expected, found: blocks.len() });
     }
-    match format {
-        BlockFormat::Bc1 => block::encode(samples, extent, blocks, bc1::encode),
-        BlockFormat::Bc3 => {
-            block::encode(samples, extent, blocks, |texels| bc3::encode(texels, options.colour_weight));
-        }
-        BlockFormat::Bc4 => block::encode(samples, extent, blocks, bc4::encode),
-        BlockFormat::Bc7 => {
-            block::encode_rows(samples, extent, blocks, format.block_bytes(), |rows, blocks| {
-                bc7::encode_row(rows, blocks, options);
-            });
-        }
-    }
+    encode_into(format, samples, extent, options, blocks, Simd::best());
     Ok(())
+}
+
+fn encode_into(
+    format: BlockFormat,
+    samples: &[u8],
+    extent: Extent3,
+    options: EncodeOptions,
+    blocks: &mut [u8],
+    simd: Simd,
+) {
+    if format == BlockFormat::Bc4 {
+        let (voxels, _) = samples.as_chunks::<1>();
+        block::encode_rows(voxels, extent, blocks, 8, |rows, blocks| {
+            encode_scalar_row(rows.map(|row| row.as_flattened()), blocks, options, simd);
+        });
+    } else {
+        let (voxels, _) = samples.as_chunks::<4>();
+        block::encode_rows(voxels, extent, blocks, format.block_bytes(), |rows, blocks| {
+            encode_row(format, rows, blocks, options, simd);
+        });
+    }
 }
 
 /// Decodes a volume: the inverse of [`encode_volume`], for blocks of any encoder.
@@ -277,36 +292,47 @@ pub fn decode_volume(format: BlockFormat, blocks: &[u8], extent: Extent3) -> Res
     Ok(samples)
 }
 
+/// The block of BC3 of one colour; its last 8 bytes are BC1.
 pub(crate) fn constant(texel: [u8; 4]) -> [u8; 16] {
-    bc3::encode(&[texel; 16], ColourWeight::Equal)
+    rows::constant(texel)
 }
 
+/// The texels of one block of colours, x fastest; nothing if its bytes are not those of the format.
 pub(crate) fn decode_colours(format: BlockFormat, block: &[u8]) -> [[u8; 4]; 16] {
+    let whole = || block.first_chunk().copied().unwrap_or_default();
     match format {
-        BlockFormat::Bc1 => bc1::decode(block.try_into().unwrap()),
-        _ => bc3::decode(block.try_into().unwrap()),
+        BlockFormat::Bc1 => bc1::decode(block.first_chunk().copied().unwrap_or_default()),
+        BlockFormat::Bc7 => bc7::decode(whole()),
+        BlockFormat::Bc3 | BlockFormat::Bc4 => bc3::decode(whole()),
     }
 }
 
+/// The texels of one block of BC4, x fastest.
 pub(crate) fn decode_scalars(block: &[u8]) -> [u8; 16] {
-    bc4::decode(block.try_into().unwrap()).map(|[v]| v)
+    bc4::decode(block.first_chunk().copied().unwrap_or_default()).map(|[v]| v)
 }
 
-pub(crate) fn encode_row(format: BlockFormat, rows: [&[[u8; 4]]; 4], out: &mut [u8], options: EncodeOptions) {
-    for (i, block) in out.chunks_exact_mut(format.block_bytes()).enumerate() {
-        let texels = std::array::from_fn(|k| rows[k / 4][4 * i + k % 4]);
-        match format {
-            BlockFormat::Bc1 => block.copy_from_slice(&bc1::encode(&texels)),
-            _ => block.copy_from_slice(&bc3::encode(&texels, options.colour_weight)),
+/// Encodes one row of blocks of colours: `rows` are its four rows of voxels, of one length each, `out` a block for
+/// each four voxels begun. Past the end of a row its last voxel is repeated.
+pub(crate) fn encode_row(
+    format: BlockFormat,
+    rows: [&[[u8; 4]]; 4],
+    out: &mut [u8],
+    options: EncodeOptions,
+    simd: Simd,
+) {
+    match format {
+        BlockFormat::Bc1 => rows::encode_colours::<8>(rows, out.as_chunks_mut().0, options, simd),
+        BlockFormat::Bc7 => bc7::encode_row(rows, out, options),
+        BlockFormat::Bc3 | BlockFormat::Bc4 => {
+            rows::encode_colours::<16>(rows, out.as_chunks_mut().0, options, simd);
         }
     }
 }
 
-pub(crate) fn encode_scalar_row(rows: [&[u8]; 4], out: &mut [u8], _: EncodeOptions) {
-    for (i, block) in out.chunks_exact_mut(8).enumerate() {
-        let texels = std::array::from_fn(|k| [rows[k / 4][4 * i + k % 4]]);
-        block.copy_from_slice(&bc4::encode(&texels));
-    }
+/// Encodes one row of blocks of BC4, see [`encode_row`].
+pub(crate) fn encode_scalar_row(rows: [&[u8]; 4], out: &mut [u8], options: EncodeOptions, simd: Simd) {
+    rows::encode_scalars(rows, out.as_chunks_mut().0, options, simd);
 }
 
 /// `len` zero bytes, or none where there is no memory for them.

@@ -239,7 +239,7 @@ fn colour_task<const BYTES: usize>(
 ) -> EncodeStats {
     let mut stats = EncodeStats { blocks: blocks.len() as u64, ..EncodeStats::default() };
     let Scratch { strip, curve, colours, known, .. } = scratch;
-    let encode = |rows: [&[[u8; 4]]; EDGE], out: &mut [u8]| bc::encode_row(format, rows, out, job.options);
+    let encode = |rows: [&[[u8; 4]]; EDGE], out: &mut [u8]| bc::encode_row(format, rows, out, job.options, job.simd);
     let constants = table.constants();
     let constant = |run: u16| {
         let constant = &constants[usize::from(run)];
@@ -319,7 +319,7 @@ fn scalar_task(
     let mut stats = EncodeStats { blocks: blocks.len() as u64, ..EncodeStats::default() };
     let Scratch { strip, scalars, known, .. } = scratch;
     let encode = |rows: [&[[u8; 1]]; EDGE], out: &mut [u8]| {
-        bc::encode_scalar_row(rows.map(|row| row.as_flattened()), out, job.options);
+        bc::encode_scalar_row(rows.map(|row| row.as_flattened()), out, job.options, job.simd);
     };
     // Both ends the same, all indices 0.
     let constant = |texel: u8| [texel, texel, 0, 0, 0, 0, 0, 0];

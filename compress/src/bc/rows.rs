@@ -1,0 +1,207 @@
+//! From rows of voxels to blocks of BC1, BC3 and BC4: what is constant is written at once, the rest goes to the kernels
+//! in batches.
+
+use super::batch::{EDGE, LANES, Plane, Strip, Words, colour_planes, scalar_plane};
+use super::endpoints::TEXELS;
+use super::{EncodeOptions, bc1, colour, scalar};
+use crate::simd::Simd;
+
+/// Encodes one row of blocks of BC4: `rows` are its four rows of voxels, of one length each, `out` a block for each
+/// four voxels begun. Past the end of a row its last voxel is repeated.
+pub(super) fn encode_scalars(rows: [&[u8]; EDGE], out: &mut [[u8; 8]], options: EncodeOptions, simd: Simd) {
+    let mut blocks = [[0; 4]; LANES];
+    let mut padded = [[0; LANES * EDGE]; EDGE];
+    for (i, out) in out.chunks_mut(LANES).enumerate() {
+        let rest = rows.map(|row| &row[i * LANES * EDGE..]);
+        if let [Some(a), Some(b), Some(c), Some(d)] = rest.map(|row| row.first_chunk()) {
+            scalars([a, b, c, d], options, simd, &mut blocks);
+        } else {
+            for (padded, row) in padded.iter_mut().zip(rest) {
+                let (whole, beyond) = padded.split_at_mut(row.len().min(LANES * EDGE));
+                whole.copy_from_slice(&row[..whole.len()]);
+                beyond.fill(row.last().copied().unwrap_or_default());
+            }
+            scalars(padded.each_ref(), options, simd, &mut blocks);
+        }
+        for (out, block) in out.iter_mut().zip(&blocks) {
+            *out = bytes(*block);
+        }
+    }
+}
+
+/// Encodes one row of blocks of BC1, if they have 8 bytes, or BC3, see [`encode_scalars`].
+pub(super) fn encode_colours<const BYTES: usize>(
+    rows: [&[[u8; 4]]; EDGE],
+    out: &mut [[u8; BYTES]],
+    options: EncodeOptions,
+    simd: Simd,
+) {
+    let mut batch = Batch::new();
+    let mut last = ([0; 4], constant::<BYTES>([0; 4]));
+    for place in 0..out.len() {
+        let fours = rows.map(|row| four(row, place));
+        if let Some(texel) = one_texel(&fours) {
+            if texel != last.0 {
+                last = (texel, constant(texel));
+            }
+            out[place] = last.1;
+        } else if batch.push(&fours, place) {
+            batch.flush(out, options, simd);
+        }
+    }
+    batch.flush(out, options, simd);
+}
+
+/// The four texels of a row of block `place`. Past the end the last is repeated.
+fn four(row: &[[u8; 4]], place: usize) -> [[u8; 4]; EDGE] {
+    let rest = &row[EDGE * place..];
+    match rest.first_chunk() {
+        Some(four) => *four,
+        None => std::array::from_fn(|k| rest[k.min(rest.len() - 1)]),
+    }
+}
+
+/// The texel that all 16 are, if they are.
+fn one_texel(fours: &[[[u8; 4]; EDGE]; EDGE]) -> Option<[u8; 4]> {
+    let [a, b, c, d] = fours;
+    let [x, y, z, w] = a;
+    (a == b && a == c && a == d && x == y && x == z && x == w).then_some(*x)
+}
+
+/// The block of one colour.
+pub(super) fn constant<const BYTES: usize>([red, green, blue, alpha]: [u8; 4]) -> [u8; BYTES] {
+    let mut block = [0; BYTES];
+    let (alphas, colours) = block.split_at_mut(BYTES - 8);
+    if let [low, high, ..] = alphas {
+        (*low, *high) = (alpha, alpha);
+    }
+    colours.copy_from_slice(&bc1::solid([red, green, blue]));
+    block
+}
+
+/// A block as it is stored.
+fn bytes([a, b, c, d]: Words) -> [u8; 8] {
+    (u64::from(a) | u64::from(b) << 16 | u64::from(c) << 32 | u64::from(d) << 48).to_le_bytes()
+}
+
+/// Blocks of colours that wait for the kernels.
+struct Batch {
+    rows: Strip<4>,
+    /// Which block of the output each is.
+    at: [u32; LANES],
+    len: usize,
+}
+
+impl Batch {
+    fn new() -> Self {
+        Self { rows: [[[0; 4]; LANES * EDGE]; EDGE], at: [0; LANES], len: 0 }
+    }
+
+    /// Adds a block that goes to place `at`; says whether the batch is full.
+    fn push(&mut self, fours: &[[[u8; 4]; EDGE]; EDGE], at: usize) -> bool {
+        for (row, four) in self.rows.iter_mut().zip(fours) {
+            row.as_chunks_mut::<EDGE>().0[self.len] = *four;
+        }
+        self.at[self.len] = at as u32;
+        self.len += 1;
+        self.len == LANES
+    }
+
+    /// Encodes what waits.
+    fn flush<const BYTES: usize>(&mut self, out: &mut [[u8; BYTES]], options: EncodeOptions, simd: Simd) {
+        if self.len == 0 {
+            return;
+        }
+        let mut blocks = [[[0; 4]; LANES]; 2];
+        colours(&self.rows, BYTES == 16, options, simd, &mut blocks);
+        let [alphas, colours] = blocks;
+        for ((alpha, colour), at) in alphas.into_iter().zip(colours).zip(&self.at[..self.len]) {
+            let (alphas, colours) = out[*at as usize].split_at_mut(BYTES - 8);
+            if BYTES == 16 {
+                alphas.copy_from_slice(&bytes(alpha));
+            }
+            colours.copy_from_slice(&bytes(colour));
+        }
+        self.len = 0;
+    }
+}
+
+/// The blocks of a strip of one channel.
+fn scalars(
+    strip: [&[u8; LANES * EDGE]; EDGE],
+    options: EncodeOptions,
+    simd: Simd,
+    blocks: &mut [Words; LANES],
+) {
+    match simd {
+        Simd::Plain => scalars_plain(strip, options, blocks),
+        #[cfg(target_arch = "x86_64")]
+        Simd::Avx2(_) => {
+            #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
+            // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
+            unsafe {
+                scalars_avx2(strip, options, blocks);
+            }
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+fn scalars_avx2(strip: [&[u8; LANES * EDGE]; EDGE], options: EncodeOptions, blocks: &mut [Words; LANES]) {
+    scalars_plain(strip, options, blocks);
+}
+
+#[inline(always)]
+fn scalars_plain(strip: [&[u8; LANES * EDGE]; EDGE], options: EncodeOptions, blocks: &mut [Words; LANES]) {
+    let mut plane: Plane = [[0; LANES]; TEXELS];
+    scalar_plane(strip, &mut plane);
+    scalar::encode(&plane, options.level, blocks);
+}
+
+/// The blocks of a strip of four channels: those of alpha, if it is asked for, and those of colour.
+fn colours(
+    strip: &Strip<4>,
+    with_alpha: bool,
+    options: EncodeOptions,
+    simd: Simd,
+    blocks: &mut [[Words; LANES]; 2],
+) {
+    match simd {
+        Simd::Plain => colours_plain(strip, with_alpha, options, blocks),
+        #[cfg(target_arch = "x86_64")]
+        Simd::Avx2(_) => {
+            #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
+            // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
+            unsafe {
+                colours_avx2(strip, with_alpha, options, blocks);
+            }
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+fn colours_avx2(
+    strip: &Strip<4>,
+    with_alpha: bool,
+    options: EncodeOptions,
+    blocks: &mut [[Words; LANES]; 2],
+) {
+    colours_plain(strip, with_alpha, options, blocks);
+}
+
+#[inline(always)]
+fn colours_plain(
+    strip: &Strip<4>,
+    with_alpha: bool,
+    options: EncodeOptions,
+    [alphas, colours]: &mut [[Words; LANES]; 2],
+) {
+    let mut planes: [Plane; 4] = [[[0; LANES]; TEXELS]; 4];
+    colour_planes(strip, &mut planes);
+    if with_alpha {
+        scalar::encode(&planes[3], options.level, alphas);
+    }
+    colour::encode(&planes, with_alpha, options, colours);
+}
