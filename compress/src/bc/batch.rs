@@ -33,35 +33,52 @@ pub(super) fn rounded(value: f32) -> i16 {
     (value + ROUND).to_bits() as i16
 }
 
-/// One value for each texel. Written out, so that the loop around it over lanes is one of straight code, which the
-/// compiler vectorises.
+/// A number from -16384 to 16383, rounded to the nearest.
 #[inline(always)]
-pub(super) fn each<T>(f: impl Fn(usize) -> T) -> [T; TEXELS] {
-    [
-        f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7), f(8), f(9), f(10), f(11), f(12), f(13), f(14), f(15),
-    ]
+pub(super) fn rounded_signed(value: f32) -> i16 {
+    rounded(value + 16384.0) - 16384
 }
 
-/// The sum over all texels.
+/// One value for each texel, `each!(|i| …)`. Written out, so that the loop around it over lanes is one of straight code,
+/// which the compiler vectorises; a closure called 16 times it may leave as a call.
+macro_rules! each {
+    (|$i:ident| $value:expr) => {
+        each!(@ $i $value; 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15)
+    };
+    (@ $i:ident $value:expr; $($number:literal)*) => {
+        [$({ let $i: usize = $number; $value }),*]
+    };
+}
+pub(super) use each;
+
+/// The sum of all texels.
 #[inline(always)]
-pub(super) fn sum(f: impl Fn(usize) -> i16) -> i16 {
-    let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = each(f);
-    let add = i16::wrapping_add;
-    let upper = add(add(add(a, b), add(c, d)), add(add(e, f), add(g, h)));
-    add(upper, add(add(add(i, j), add(k, l)), add(add(m, n), add(o, p))))
+pub(super) fn sum(values: &[i16; TEXELS]) -> i16 {
+    let mut sum = values[0];
+    for value in &values[1..] {
+        sum = sum.wrapping_add(*value);
+    }
+    sum
 }
 
-/// The least and the greatest of all texels.
+/// The least of all texels.
 #[inline(always)]
 pub(super) fn least_of(values: &[i16; TEXELS]) -> i16 {
-    let four = |k: usize| values[k].min(values[k + 1]).min(values[k + 2].min(values[k + 3]));
-    four(0).min(four(4)).min(four(8).min(four(12)))
+    let mut least = values[0];
+    for value in &values[1..] {
+        least = least.min(*value);
+    }
+    least
 }
 
+/// The greatest of all texels.
 #[inline(always)]
 pub(super) fn most_of(values: &[i16; TEXELS]) -> i16 {
-    let four = |k: usize| values[k].max(values[k + 1]).max(values[k + 2].max(values[k + 3]));
-    four(0).max(four(4)).max(four(8).max(four(12)))
+    let mut most = values[0];
+    for value in &values[1..] {
+        most = most.max(*value);
+    }
+    most
 }
 
 /// The blocks of a batch from their first words, their second words, and so on.

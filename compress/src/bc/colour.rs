@@ -1,6 +1,6 @@
 //! The kernel of BC1, and of colour in BC3: a batch of blocks at a time, see `batch`.
 
-use super::batch::{LANES, Plane, ROUND, Row, Words, each, interleave, least_of, most_of, rounded, sum};
+use super::batch::{LANES, Plane, ROUND, Row, Words, each, interleave, least_of, most_of, rounded, rounded_signed, sum};
 use super::endpoints::TEXELS;
 use super::{ColourWeight, EncodeOptions, Level, bc1};
 
@@ -82,10 +82,10 @@ fn range(texels: [&Plane; 3], low: &mut Channels, high: &mut Channels, total: &m
     for c in 0..3 {
         let (plane, low, high, total) = (texels[c], &mut low[c], &mut high[c], &mut total[c]);
         for l in 0..LANES {
-            let values = each(|i| plane[i][l]);
+            let values = each!(|i| plane[i][l]);
             low[l] = least_of(&values);
             high[l] = most_of(&values);
-            total[l] = sum(|i| values[i]);
+            total[l] = sum(&values);
         }
     }
 }
@@ -99,13 +99,13 @@ fn diagonal(texels: [&Plane; 3], low: &Channels, high: &Channels, ends: &mut [Re
     let middle = |c: usize, l: usize| (low[c][l] + high[c][l]) >> 1;
     for l in 0..LANES {
         let [r0, g0, b0] = [middle(0, l), middle(1, l), middle(2, l)];
-        let off = each(|i| [(red[i][l] - r0) >> 1, (green[i][l] - g0) >> 1, blue[i][l] - b0 >> 1]);
-        signs[0][l] = sum(|i| off[i][0] * off[i][1] >> 2);
-        signs[1][l] = sum(|i| off[i][1] * off[i][2] >> 2);
-        signs[2][l] = sum(|i| off[i][0] * off[i][2] >> 2);
+        let off = each!(|i| [(red[i][l] - r0) >> 1, (green[i][l] - g0) >> 1, blue[i][l] - b0 >> 1]);
+        signs[0][l] = sum(&each!(|i| off[i][0] * off[i][1] >> 2));
+        signs[1][l] = sum(&each!(|i| off[i][1] * off[i][2] >> 2));
+        signs[2][l] = sum(&each!(|i| off[i][0] * off[i][2] >> 2));
     }
     for l in 0..LANES {
-        let range = [0, 1, 2].map(|c: usize| high[c][l] - low[c][l]);
+        let range = [high[0][l] - low[0][l], high[1][l] - low[1][l], high[2][l] - low[2][l]];
         // Green decides, but where its range is less than half of another's.
         let green_leads = 2 * range[1] >= range[0].max(range[2]);
         let red_falls = signs[0][l] < 0 && green_leads;
@@ -124,8 +124,7 @@ fn diagonal(texels: [&Plane; 3], low: &Channels, high: &Channels, ends: &mut [Re
 fn principal(texels: [&Plane; 3], low: &Channels, high: &Channels, total: &Channels, ends: &mut [Reals; 2]) {
     let mut scale = [0; LANES];
     for l in 0..LANES {
-        let widest = [0, 1, 2].map(|c: usize| high[c][l] - low[c][l]);
-        let widest = widest[0].max(widest[1]).max(widest[2]).max(6);
+        let widest = (high[0][l] - low[0][l]).max(high[1][l] - low[1][l]).max(high[2][l] - low[2][l]).max(6);
         scale[l] = rounded(HALF_RANGE * 4096.0 / f32::from(widest));
     }
     let mut covariance = [[0_i16; LANES]; 6];
@@ -141,7 +140,7 @@ fn principal(texels: [&Plane; 3], low: &Channels, high: &Channels, total: &Chann
     let [red, green, blue] = &centred;
     for (k, [a, b]) in [[red, red], [red, green], [red, blue], [green, green], [green, blue], [blue, blue]].into_iter().enumerate() {
         for l in 0..LANES {
-            covariance[k][l] = sum(|i| a[i][l] * b[i][l]);
+            covariance[k][l] = sum(&each!(|i| a[i][l] * b[i][l]));
         }
     }
     let mut axis = [[0_i16; LANES]; 3];
@@ -149,7 +148,7 @@ fn principal(texels: [&Plane; 3], low: &Channels, high: &Channels, total: &Chann
     let (mut least, mut most) = ([0_i16; LANES], [0_i16; LANES]);
     for l in 0..LANES {
         let [x, y, z] = [axis[0][l], axis[1][l], axis[2][l]];
-        let places = each(|i| x * red[i][l] + y * green[i][l] + z * blue[i][l]);
+        let places = each!(|i| x * red[i][l] + y * green[i][l] + z * blue[i][l]);
         least[l] = least_of(&places);
         most[l] = most_of(&places);
     }
@@ -169,10 +168,11 @@ const AXIS: f32 = 128.0;
 /// The direction of largest variance, of length [`AXIS`].
 #[inline(always)]
 fn principal_axis(covariance: &[Row; 6], axis: &mut Channels) {
+    let [rr, rg, rb, gg, gb, bb] = covariance;
     for l in 0..LANES {
-        let [rr, rg, rb, gg, gb, bb] = [0, 1, 2, 3, 4, 5].map(|k: usize| f32::from(covariance[k][l]));
-        let scale = 1.0 / (rr + gg + bb + 1.0);
-        let [rr, rg, rb, gg, gb, bb] = [rr, rg, rb, gg, gb, bb].map(|value| value * scale);
+        let scale = 1.0 / (f32::from(rr[l]) + f32::from(gg[l]) + f32::from(bb[l]) + 1.0);
+        let (rr, rg, rb) = (f32::from(rr[l]) * scale, f32::from(rg[l]) * scale, f32::from(rb[l]) * scale);
+        let (gg, gb, bb) = (f32::from(gg[l]) * scale, f32::from(gb[l]) * scale, f32::from(bb[l]) * scale);
         // The column of the largest variance is never orthogonal to the axis unless it is the axis's own zero.
         let [mut x, mut y, mut z] = if rr > gg { [rr, rg, rb] } else { [rg, gg, gb] };
         if bb > rr && bb > gg {
@@ -183,9 +183,9 @@ fn principal_axis(covariance: &[Row; 6], axis: &mut Channels) {
         }
         let square = x * x + y * y + z * z;
         let size = AXIS / (square + 1e-30).sqrt();
-        for (axis, value) in axis.iter_mut().zip([x, y, z]) {
-            axis[l] = rounded(value * size + 16384.0) - 16384;
-        }
+        axis[0][l] = rounded_signed(x * size);
+        axis[1][l] = rounded_signed(y * size);
+        axis[2][l] = rounded_signed(z * size);
     }
 }
 
@@ -221,11 +221,12 @@ fn bits(value: f32, most: f32) -> i16 {
 fn projection(ends: &Ends, weights: &mut Channels, base: &mut Row) {
     let [from, to] = &ends.values;
     for l in 0..LANES {
-        let [r, g, b] = [0, 1, 2].map(|c: usize| f32::from(from[c][l] - to[c][l]));
+        let r = f32::from(from[0][l] - to[0][l]);
+        let g = f32::from(from[1][l] - to[1][l]);
+        let b = f32::from(from[2][l] - to[2][l]);
         let square = r * r + g * g + b * b;
-        let square = if square > 1.0 { square } else { 1.0 };
-        let scale = (3 << PLACE_BITS) as f32 / square;
-        let [r, g, b] = [r, g, b].map(|value| rounded(value * scale + 16384.0) - 16384);
+        let scale = (3 << PLACE_BITS) as f32 / (if square > 1.0 { square } else { 1.0 });
+        let (r, g, b) = (rounded_signed(r * scale), rounded_signed(g * scale), rounded_signed(b * scale));
         weights[0][l] = r;
         weights[1][l] = g;
         weights[2][l] = b;
@@ -237,7 +238,9 @@ fn projection(ends: &Ends, weights: &mut Channels, base: &mut Row) {
 /// The place of a colour between the ends: 0 to 3 thirds of the way.
 #[inline(always)]
 fn place(texels: [&Plane; 3], i: usize, l: usize, weights: &Channels, base: &Row) -> i16 {
-    let [r, g, b] = [0, 1, 2].map(|c: usize| weights[c][l].wrapping_mul(texels[c][i][l]));
+    let r = weights[0][l].wrapping_mul(texels[0][i][l]);
+    let g = weights[1][l].wrapping_mul(texels[1][i][l]);
+    let b = weights[2][l].wrapping_mul(texels[2][i][l]);
     let place = base[l].wrapping_sub(r).wrapping_sub(g).wrapping_sub(b) >> PLACE_BITS;
     place.max(0).min(3)
 }
@@ -263,12 +266,12 @@ fn refine(texels: [&Plane; 3], total: &Channels, ends: &mut Ends, best: &mut [f3
 #[inline(always)]
 fn add_up(texels: [&Plane; 3], weights: &Channels, base: &Row, sums: &mut Sums) {
     for l in 0..LANES {
-        let places = each(|i| place(texels, i, l, weights, base));
-        sums.places[l] = sum(|i| places[i]);
-        sums.squares[l] = sum(|i| places[i] * places[i]);
-        sums.products[0][l] = sum(|i| places[i] * texels[0][i][l]);
-        sums.products[1][l] = sum(|i| places[i] * texels[1][i][l]);
-        sums.products[2][l] = sum(|i| places[i] * texels[2][i][l]);
+        let places = each!(|i| place(texels, i, l, weights, base));
+        sums.places[l] = sum(&places);
+        sums.squares[l] = sum(&each!(|i| places[i] * places[i]));
+        sums.products[0][l] = sum(&each!(|i| places[i] * texels[0][i][l]));
+        sums.products[1][l] = sum(&each!(|i| places[i] * texels[1][i][l]));
+        sums.products[2][l] = sum(&each!(|i| places[i] * texels[2][i][l]));
     }
 }
 
@@ -329,21 +332,30 @@ fn pack(texels: [&Plane; 3], ends: &Ends, blocks: &mut [Words; LANES]) {
     projection(ends, &mut weights, &mut base);
     let mut words = [[0_u16; LANES]; 4];
     for l in 0..LANES {
-        let place = |i: usize| place(texels, i, l, &weights, &base) as u16;
-        let four = |i: usize| place(i) | place(i + 1) << 2 | place(i + 2) << 4 | place(i + 3) << 6;
-        let halves = [four(0) | four(4) << 8, four(8) | four(12) << 8];
-        let [from, to] = ends.packed.map(|packed| packed[l] as u16);
+        let places = each!(|i| place(texels, i, l, &weights, &base) as u16);
+        let halves = [eight(&places, 0), eight(&places, 8)];
+        let (from, to) = (ends.packed[0][l] as u16, ends.packed[1][l] as u16);
         // 0 and 1 change places with the ends, 2 and 3 too.
         let turn = if from < to { 0x5555 } else { 0 };
         words[0][l] = from.max(to);
         words[1][l] = from.min(to);
-        // Thirds of the way have the indices 0, 2, 3, 1.
-        let index = |half: u16| {
-            let (odd, upper) = (half & 0x5555, half >> 1 & 0x5555);
-            ((odd ^ upper) << 1 | upper) ^ turn
-        };
-        words[2][l] = index(halves[0]);
-        words[3][l] = index(halves[1]);
+        words[2][l] = indices(halves[0]) ^ turn;
+        words[3][l] = indices(halves[1]) ^ turn;
     }
     interleave(&words, blocks);
+}
+
+/// Eight places, of two bits each.
+#[inline(always)]
+fn eight(places: &[u16; TEXELS], i: usize) -> u16 {
+    let low = places[i] | places[i + 1] << 2 | places[i + 2] << 4 | places[i + 3] << 6;
+    let high = places[i + 4] | places[i + 5] << 2 | places[i + 6] << 4 | places[i + 7] << 6;
+    low | high << 8
+}
+
+/// The indices that stand for eight places: 0, 2, 3, 1 for 0 to 3 thirds of the way.
+#[inline(always)]
+fn indices(places: u16) -> u16 {
+    let (odd, upper) = (places & 0x5555, places >> 1 & 0x5555);
+    (odd ^ upper) << 1 | upper
 }

@@ -1,6 +1,7 @@
 //! The kernel of BC4, and of alpha in BC3: a batch of blocks at a time, see `batch`.
 
 use super::Level;
+use super::endpoints::TEXELS;
 use super::batch::{LANES, Plane, Row, Words, each, interleave, least_of, most_of, rounded};
 
 /// The narrowest range of end points: with one step a value, what spans at most 7 is kept exactly.
@@ -29,7 +30,7 @@ pub(super) fn encode(plane: &Plane, level: Level, blocks: &mut [Words; LANES]) {
 #[inline(always)]
 fn range(plane: &Plane, low: &mut Row, high: &mut Row) {
     for l in 0..LANES {
-        let values = each(|i| plane[i][l]);
+        let values = each!(|i| plane[i][l]);
         low[l] = least_of(&values);
         high[l] = most_of(&values);
     }
@@ -49,15 +50,12 @@ fn pack(plane: &Plane, [low, high]: [&Row; 2], scale: &Row, varied: &Row, blocks
     let mut words = [[0_u16; LANES]; 4];
     for l in 0..LANES {
         let (low, high, scale) = (low[l], high[l], scale[l] as u16);
-        let next = |i: usize| {
+        let next = each!(|i| {
             let down = (high - plane[i][l].max(low).min(high)) as u16;
             // Steps down from the high end, rounded, and one more: 7 + 1 is 0 since 3 bits are left.
             down.wrapping_mul(scale).wrapping_add(4096 + 8192) >> 13
-        };
-        let four = |i: usize| next(i) | next(i + 1) << 3 | next(i + 2) << 6 | next(i + 3) << 9;
-        // Indices count 0, 2, 3, … 7, 1: where they are now 1, 2, … 7, 0.
-        let turned = |four: u16| four ^ (!(four >> 1 | four >> 2) & 0o1111);
-        let [a, b, c, d] = [turned(four(0)), turned(four(4)), turned(four(8)), turned(four(12))];
+        });
+        let (a, b, c, d) = (four(&next, 0), four(&next, 4), four(&next, 8), four(&next, 12));
         let varied = varied[l] as u16;
         let (low, high) = (low as u16, high as u16);
         words[0][l] = if varied == 0 { plane[0][l] as u16 * 0x101 } else { high | low << 8 };
@@ -66,4 +64,12 @@ fn pack(plane: &Plane, [low, high]: [&Row; 2], scale: &Row, varied: &Row, blocks
         words[3][l] = (c >> 8 | d << 4) & varied;
     }
     interleave(&words, blocks);
+}
+
+/// The indices of four texels, of 3 bits each. They count 0, 2, 3, … 7, 1 from the high end down, where `next` counts
+/// 1, 2, … 7, 0.
+#[inline(always)]
+fn four(next: &[u16; TEXELS], i: usize) -> u16 {
+    let four = next[i] | next[i + 1] << 3 | next[i + 2] << 6 | next[i + 3] << 9;
+    four ^ (!(four >> 1 | four >> 2) & 0o1111)
 }
