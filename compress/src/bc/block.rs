@@ -7,46 +7,8 @@ use crate::Extent3;
 /// Voxels of a block, in x and in y.
 const EDGE: usize = 4;
 
-/// Slices of a work unit.
-const UNIT_SLICES: usize = 4;
-
 /// The 16 voxels of one block, `[x, y]`, x fastest; `N` bytes a voxel.
 pub(super) type Texels<const N: usize> = [[u8; N]; EDGE * EDGE];
-
-/// One row of work units: up to four slices of one row of blocks, and where they go.
-struct UnitRow<'a> {
-    /// First slice.
-    z: usize,
-    /// Row of blocks.
-    block_y: usize,
-    /// The bytes of that row of blocks in each of the slices.
-    rows: Vec<&'a mut [u8]>,
-}
-
-/// Encodes all blocks of a volume. `samples` and `blocks` have the lengths of the extent.
-pub(super) fn encode<const N: usize, const BYTES: usize>(
-    samples: &[u8],
-    extent: Extent3,
-    blocks: &mut [u8],
-    encode_block: impl Fn(&Texels<N>) -> [u8; BYTES] + Sync,
-) {
-    let (voxels, _) = samples.as_chunks::<N>();
-    unit_rows(extent, blocks, BYTES).into_par_iter().for_each(|mut unit_row| {
-        for block_x in 0..extent.blocks()[0] {
-            let mut last: Option<(Texels<N>, [u8; BYTES])> = None;
-            for (slice, row) in unit_row.rows.iter_mut().enumerate() {
-                let texels = gather(voxels, extent, [block_x, unit_row.block_y, unit_row.z + slice]);
-                // Within a unit the slice before is often the same, in air nearly always.
-                let bytes = match last {
-                    Some((before, bytes)) if before == texels => bytes,
-                    _ => encode_block(&texels),
-                };
-                row[block_x * BYTES..][..BYTES].copy_from_slice(&bytes);
-                last = Some((texels, bytes));
-            }
-        }
-    });
-}
 
 /// Encodes all blocks of a volume by whole rows: four rows of voxels, the last repeated past the far edge in y.
 pub(super) fn encode_rows<const N: usize>(
@@ -83,45 +45,6 @@ pub(super) fn decode<const N: usize, const BYTES: usize>(
             }
         }
     });
-}
-
-/// Splits the blocks of a volume into rows of work units, each with its own part of `blocks`.
-fn unit_rows(extent: Extent3, blocks: &mut [u8], block_bytes: usize) -> Vec<UnitRow<'_>> {
-    let [blocks_x, blocks_y, slices] = extent.blocks();
-    let row_bytes = blocks_x * block_bytes;
-    let slice_bytes = row_bytes * blocks_y;
-    let mut unit_rows = Vec::with_capacity(blocks_y * slices.div_ceil(UNIT_SLICES));
-    for (slab, bytes) in blocks.chunks_mut(slice_bytes * UNIT_SLICES).enumerate() {
-        let first = unit_rows.len();
-        unit_rows.extend((0..blocks_y).map(|block_y| UnitRow {
-            z: slab * UNIT_SLICES,
-            block_y,
-            rows: Vec::with_capacity(UNIT_SLICES),
-        }));
-        for slice in bytes.chunks_mut(slice_bytes) {
-            for (unit_row, row) in unit_rows[first..].iter_mut().zip(slice.chunks_mut(row_bytes)) {
-                unit_row.rows.push(row);
-            }
-        }
-    }
-    unit_rows
-}
-
-/// The voxels of block `[x, y, z]`. Past the far edges the last voxel is repeated.
-fn gather<const N: usize>(voxels: &[[u8; N]], extent: Extent3, block: [usize; 3]) -> Texels<N> {
-    let [x, y, z] = [block[0] * EDGE, block[1] * EDGE, block[2]];
-    let mut texels = [[0; N]; EDGE * EDGE];
-    for (j, row) in texels.chunks_exact_mut(EDGE).enumerate() {
-        let line = (z * extent.y() + (y + j).min(extent.y() - 1)) * extent.x();
-        if x + EDGE <= extent.x() {
-            row.copy_from_slice(&voxels[line + x..][..EDGE]);
-        } else {
-            for (i, texel) in row.iter_mut().enumerate() {
-                *texel = voxels[line + (x + i).min(extent.x() - 1)];
-            }
-        }
-    }
-    texels
 }
 
 /// Writes the voxels of a block that lie inside the volume; `rows` begins at the block's first row.

@@ -104,15 +104,23 @@ fn diagonal(texels: [&Plane; 3], low: &Channels, high: &Channels, ends: &mut [Re
         signs[1][l] = sum(&each!(|i| off[i][1] * off[i][2] >> 2));
         signs[2][l] = sum(&each!(|i| off[i][0] * off[i][2] >> 2));
     }
+    // Which channel falls where the others rise, all ones if it does: green decides, but where its range is less than
+    // half of another's.
+    let mut falls = [[0_i16; LANES]; 3];
     for l in 0..LANES {
-        let range = [high[0][l] - low[0][l], high[1][l] - low[1][l], high[2][l] - low[2][l]];
-        // Green decides, but where its range is less than half of another's.
-        let green_leads = 2 * range[1] >= range[0].max(range[2]);
-        let red_falls = signs[0][l] < 0 && green_leads;
-        let blue_falls = if green_leads { signs[1][l] < 0 } else { signs[2][l] < 0 };
-        for (c, falls) in [(0, red_falls), (1, signs[0][l] < 0 && !green_leads), (2, blue_falls)] {
-            let inset = f32::from(range[c]) * (1.0 / 16.0);
-            let (least, most) = (f32::from(low[c][l]) + inset, f32::from(high[c][l]) - inset);
+        let (red, green, blue) = (high[0][l] - low[0][l], high[1][l] - low[1][l], high[2][l] - low[2][l]);
+        let other_leads = if 2 * green < red.max(blue) { -1 } else { 0 };
+        let (red_green, green_blue, red_blue) = (signs[0][l] >> 15, signs[1][l] >> 15, signs[2][l] >> 15);
+        falls[0][l] = red_green & !other_leads;
+        falls[1][l] = red_green & other_leads;
+        falls[2][l] = green_blue & !other_leads | red_blue & other_leads;
+    }
+    for c in 0..3 {
+        for l in 0..LANES {
+            let (least, most) = (f32::from(low[c][l]), f32::from(high[c][l]));
+            let inset = (most - least) * (1.0 / 16.0);
+            let (least, most) = (least + inset, most - inset);
+            let falls = falls[c][l] < 0;
             ends[0][c][l] = if falls { least } else { most };
             ends[1][c][l] = if falls { most } else { least };
         }
@@ -319,8 +327,9 @@ fn least_squares(total: &Channels, sums: &Sums, now: &Ends, ends: &mut [Reals; 2
             let defined = determinant > 0.5;
             let slope = (16.0 * product - places * total) / if defined { determinant } else { 1.0 };
             let from = (total - slope * places) * (1.0 / 16.0);
-            ends[0][c][l] = if defined { from } else { f32::from(now.values[0][c][l]) };
-            ends[1][c][l] = if defined { from + 3.0 * slope } else { f32::from(now.values[1][c][l]) };
+            let (now_from, now_to) = (f32::from(now.values[0][c][l]), f32::from(now.values[1][c][l]));
+            ends[0][c][l] = if defined { from } else { now_from };
+            ends[1][c][l] = if defined { from + 3.0 * slope } else { now_to };
         }
     }
 }
