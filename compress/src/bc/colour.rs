@@ -265,7 +265,7 @@ fn refine(texels: [&Plane; 3], total: &Channels, ends: &mut Ends, best: &mut [f3
         keep(&tried, total, &sums, ends, best);
         if round < 2 {
             let mut reals = [[[0.0; LANES]; 3]; 2];
-            least_squares(total, &sums, &tried, &mut reals);
+            least_squares(total, &sums, &mut reals);
             quantise(&reals, &mut tried);
         }
     }
@@ -286,21 +286,23 @@ fn add_up(texels: [&Plane; 3], weights: &Channels, base: &Row, sums: &mut Sums) 
 /// Takes what was tried where its error is the least.
 #[inline(always)]
 fn keep(tried: &Ends, total: &Channels, sums: &Sums, ends: &mut Ends, best: &mut [f32; LANES]) {
+    // Without the squares of the values, which are the same for all that is tried.
+    let mut errors = [0.0; LANES];
+    for c in 0..3 {
+        let (from, to) = (&tried.values[0][c], &tried.values[1][c]);
+        let (total, products) = (&total[c], &sums.products[c]);
+        for l in 0..LANES {
+            let (places, squares) = (f32::from(sums.places[l]), f32::from(sums.squares[l]));
+            let step = f32::from(to[l] - from[l]) * (1.0 / 3.0);
+            let from = f32::from(from[l]);
+            errors[l] += from * (16.0 * from - 2.0 * f32::from(total[l]))
+                + step * (step * squares + 2.0 * (from * places - f32::from(products[l])));
+        }
+    }
     let mut better = [0_i16; LANES];
     for l in 0..LANES {
-        let (places, squares) = (f32::from(sums.places[l]), f32::from(sums.squares[l]));
-        // Without the squares of the values, which are the same for all that is tried.
-        let mut error = 0.0;
-        for c in 0..3 {
-            let from = f32::from(tried.values[0][c][l]);
-            let step = (f32::from(tried.values[1][c][l]) - from) * (1.0 / 3.0);
-            let (total, product) = (f32::from(total[c][l]), f32::from(sums.products[c][l]));
-            error += from * (16.0 * from - 2.0 * total)
-                + step * (step * squares + 2.0 * (from * places - product));
-        }
-        let is_better = error < best[l];
-        best[l] = if is_better { error } else { best[l] };
-        better[l] = if is_better { -1 } else { 0 };
+        better[l] = if errors[l] < best[l] { -1 } else { 0 };
+        best[l] = if errors[l] < best[l] { errors[l] } else { best[l] };
     }
     for end in 0..2 {
         for l in 0..LANES {
@@ -316,20 +318,25 @@ fn keep(tried: &Ends, total: &Channels, sums: &Sums, ends: &mut Ends, best: &mut
     }
 }
 
-/// The ends that fit the texels best where they are placed now; those of now where the places define none.
+/// The ends that fit the texels best where they are placed now; their mean, twice, if they are all at one place.
 #[inline(always)]
-fn least_squares(total: &Channels, sums: &Sums, now: &Ends, ends: &mut [Reals; 2]) {
+fn least_squares(total: &Channels, sums: &Sums, ends: &mut [Reals; 2]) {
+    let (mut inverse, mut places) = ([0.0; LANES], [0.0; LANES]);
+    for l in 0..LANES {
+        places[l] = f32::from(sums.places[l]);
+        let determinant = 16.0 * f32::from(sums.squares[l]) - places[l] * places[l];
+        // Whole numbers, and at least 15 unless all places are the same.
+        inverse[l] = if determinant > 0.5 { 1.0 / determinant } else { 0.0 };
+    }
+    let [from, to] = ends;
     for c in 0..3 {
+        let (total, products, from, to) = (&total[c], &sums.products[c], &mut from[c], &mut to[c]);
         for l in 0..LANES {
-            let (places, squares) = (f32::from(sums.places[l]), f32::from(sums.squares[l]));
-            let (total, product) = (f32::from(total[c][l]), f32::from(sums.products[c][l]));
-            let determinant = 16.0 * squares - places * places;
-            let defined = determinant > 0.5;
-            let slope = (16.0 * product - places * total) / if defined { determinant } else { 1.0 };
-            let from = (total - slope * places) * (1.0 / 16.0);
-            let (now_from, now_to) = (f32::from(now.values[0][c][l]), f32::from(now.values[1][c][l]));
-            ends[0][c][l] = if defined { from } else { now_from };
-            ends[1][c][l] = if defined { from + 3.0 * slope } else { now_to };
+            let total = f32::from(total[l]);
+            let slope = (16.0 * f32::from(products[l]) - places[l] * total) * inverse[l];
+            let start = (total - slope * places[l]) * (1.0 / 16.0);
+            from[l] = start;
+            to[l] = start + 3.0 * slope;
         }
     }
 }
