@@ -10,19 +10,28 @@ const EDGE: usize = 4;
 /// The 16 voxels of one block, `[x, y]`, x fastest; `N` bytes a voxel.
 pub(super) type Texels<const N: usize> = [[u8; N]; EDGE * EDGE];
 
-/// Encodes all blocks of a volume by whole rows: four rows of voxels, the last repeated past the far edge in y.
-pub(super) fn encode_rows<const N: usize>(
-    voxels: &[[u8; N]],
+/// Blocks of one task, about: enough that starting it costs nothing, few enough to share out evenly.
+const TASK_BLOCKS: usize = 2048;
+
+/// Encodes all blocks of a volume in tasks of some rows of blocks. For each row `encode_rows` gets its four rows of
+/// voxels, the last repeated past the far edge in y, and it gets the blocks of all rows of the task.
+pub(super) fn encode_rows<'a, const N: usize>(
+    voxels: &'a [[u8; N]],
     extent: Extent3,
     blocks: &mut [u8],
     block_bytes: usize,
-    encode_row: impl Fn([&[[u8; N]]; EDGE], &mut [u8]) + Sync,
+    encode_rows: impl Fn(&mut dyn Iterator<Item = [&'a [[u8; N]]; EDGE]>, &mut [u8]) + Sync,
 ) {
     let [blocks_x, blocks_y, _] = extent.blocks();
-    blocks.par_chunks_mut(blocks_x * block_bytes).enumerate().for_each(|(row, blocks)| {
-        let (z, block_y) = (row / blocks_y, row % blocks_y);
-        let line = |j: usize| z * extent.y() + (block_y * EDGE + j).min(extent.y() - 1);
-        encode_row([0, 1, 2, 3].map(|j| &voxels[line(j) * extent.x()..][..extent.x()]), blocks);
+    let rows = (TASK_BLOCKS / blocks_x).max(1);
+    blocks.par_chunks_mut(rows * blocks_x * block_bytes).enumerate().for_each(|(task, blocks)| {
+        let first = task * rows;
+        let mut lines = (first..first + blocks.len() / (blocks_x * block_bytes)).map(|row| {
+            let (z, block_y) = (row / blocks_y, row % blocks_y);
+            let line = |j: usize| z * extent.y() + (block_y * EDGE + j).min(extent.y() - 1);
+            [0, 1, 2, 3].map(|j| &voxels[line(j) * extent.x()..][..extent.x()])
+        });
+        encode_rows(&mut lines, blocks);
     });
 }
 

@@ -1,8 +1,10 @@
 //! The kernel of BC1, and of colour in BC3: a batch of blocks at a time, see `batch`.
 
-use super::batch::{LANES, Plane, ROUND, Row, Words, each, interleave, least_of, most_of, rounded, rounded_signed, sum};
+use super::batch::{
+    LANES, Plane, ROUND, Row, Words, each, interleave, least_of, most_of, rounded, rounded_signed, sum,
+};
 use super::endpoints::TEXELS;
-use super::{ColourWeight, EncodeOptions, Level, bc1};
+use super::{Level, bc1};
 
 /// Weight of a voxel of alpha 0, in units of alpha: 1/32 of an opaque voxel. Measured on a CT: seen colour is
 /// within 0.03 dB of what no weight at all gives it, and unseen colour, which linear filtering mixes into seen
@@ -12,6 +14,9 @@ const UNSEEN_WEIGHT: i16 = 8;
 /// Rounds of the power method. The ratio of the two largest eigenvalues of a block is seldom near 1, and where it
 /// is, any axis between the two serves as well; the least squares that follow mend the rest.
 const POWER_ROUNDS: usize = 4;
+
+/// Rounds of least squares.
+const REFINEMENTS: usize = 2;
 
 /// Half the widest range of a block, in the whole numbers that its principal axis is found in: 16 products fit 16 bits.
 const HALF_RANGE: f32 = 45.0;
@@ -33,59 +38,99 @@ struct Ends {
     values: [Channels; 2],
 }
 
-/// What a least-squares fit asks of the texels at their places, 0 to 3.
-struct Sums {
-    /// Of places, and of their squares.
-    places: Row,
-    squares: Row,
-    /// Of places times values.
-    products: Channels,
+/// Sums over a block's texels, by weight.
+struct Moments {
+    /// Of the weights.
+    weight: [f32; LANES],
+    /// Of the values.
+    values: Reals,
 }
 
-/// The blocks of the first three planes.
+/// What a least-squares fit asks of the texels at their places, 0 to 3; by weight.
+struct Sums {
+    /// Of places, and of their squares.
+    places: [f32; LANES],
+    squares: [f32; LANES],
+    /// Of places times values.
+    products: Reals,
+}
+
+/// The blocks of the first three planes; `WEIGHTED` by alpha, the fourth, at [`Level::Best`].
 #[inline(always)]
-pub(super) fn encode(planes: &[Plane; 4], _with_alpha: bool, options: EncodeOptions, blocks: &mut [Words; LANES]) {
-    let [red, green, blue, _] = planes;
+pub(super) fn encode<const WEIGHTED: bool>(planes: &[Plane; 4], level: Level, blocks: &mut [Words; LANES]) {
+    let [red, green, blue, alpha] = planes;
     let texels = [red, green, blue];
-    let (mut low, mut high, mut total) = ([[0; LANES]; 3], [[0; LANES]; 3], [[0; LANES]; 3]);
-    range(texels, &mut low, &mut high, &mut total);
+    let (mut low, mut high) = ([[0; LANES]; 3], [[0; LANES]; 3]);
+    range(texels, &mut low, &mut high);
+    let mut weights = [[1; LANES]; TEXELS];
+    let mut moments = Moments { weight: [16.0; LANES], values: [[0.0; LANES]; 3] };
+    if WEIGHTED {
+        for i in 0..TEXELS {
+            for l in 0..LANES {
+                weights[i][l] = (alpha[i][l] + UNSEEN_WEIGHT + 4) >> 3;
+            }
+        }
+    }
+    moments_of::<WEIGHTED>(texels, &weights, &mut moments);
+    let mut reals = [[[0.0; LANES]; 3]; 2];
     let mut ends = Ends { packed: [[0; LANES]; 2], values: [[[0; LANES]; 3]; 2] };
-    let _ = ColourWeight::Equal;
-    let _ = UNSEEN_WEIGHT;
-    match options.level {
-        Level::Fast => {
-            let mut reals = [[[0.0; LANES]; 3]; 2];
-            diagonal(texels, &low, &high, &mut reals);
-            quantise(&reals, &mut ends);
-        }
-        Level::Best => {
-            let mut reals = [[[0.0; LANES]; 3]; 2];
-            principal(texels, &low, &high, &total, &mut reals);
-            quantise(&reals, &mut ends);
-            let mut best = [f32::INFINITY; LANES];
-            refine(texels, &total, &mut ends, &mut best);
-        }
+    if level == Level::Fast {
+        diagonal(texels, &low, &high, &mut reals);
+        quantise(&reals, &mut ends);
+    } else {
+        principal::<WEIGHTED>(texels, &weights, &low, &high, &moments, &mut reals);
+        quantise(&reals, &mut ends);
+        refine::<WEIGHTED>(texels, &weights, &moments, &mut ends);
     }
     pack(texels, &ends, blocks);
     for l in 0..LANES {
         if ends.packed[0][l] == ends.packed[1][l] {
-            let mean = [0, 1, 2].map(|c: usize| ((total[c][l] + 8) / 16) as u8);
-            let block = u64::from_le_bytes(bc1::solid(mean));
-            blocks[l] = [0, 16, 32, 48].map(|bit| (block >> bit) as u16);
+            let mean = |c: usize| (moments.values[c][l] / moments.weight[l] + 0.5) as u8;
+            let block = u64::from_le_bytes(bc1::solid([mean(0), mean(1), mean(2)]));
+            blocks[l] = [block as u16, (block >> 16) as u16, (block >> 32) as u16, (block >> 48) as u16];
         }
     }
 }
 
-/// The least and the greatest value of each channel, and the sum.
+/// The sums of weights, and of weights times values.
 #[inline(always)]
-fn range(texels: [&Plane; 3], low: &mut Channels, high: &mut Channels, total: &mut Channels) {
+fn moments_of<const WEIGHTED: bool>(texels: [&Plane; 3], weights: &Plane, moments: &mut Moments) {
+    if WEIGHTED {
+        for l in 0..LANES {
+            moments.weight[l] = f32::from(sum(&each!(|i| weights[i][l])));
+        }
+    }
     for c in 0..3 {
-        let (plane, low, high, total) = (texels[c], &mut low[c], &mut high[c], &mut total[c]);
+        weighted_sum::<WEIGHTED>(weights, texels[c], &mut moments.values[c]);
+    }
+}
+
+/// The sum of products. Without `WEIGHTED` the first factors are at most 3, or 1 with values that are centred, and the
+/// sum fits 16 bits; with it they are 33 times that.
+#[inline(always)]
+fn weighted_sum<const WEIGHTED: bool>(factors: &Plane, values: &Plane, out: &mut [f32; LANES]) {
+    for l in 0..LANES {
+        if WEIGHTED {
+            let mut sum = 0;
+            for i in 0..TEXELS {
+                sum += i32::from(factors[i][l]) * i32::from(values[i][l]);
+            }
+            out[l] = sum as f32;
+        } else {
+            out[l] = f32::from(sum(&each!(|i| factors[i][l] * values[i][l])));
+        }
+    }
+}
+
+/// The least and the greatest value of each channel.
+#[inline(always)]
+fn range(texels: [&Plane; 3], low: &mut Channels, high: &mut Channels) {
+    for c in 0..3 {
+        let (plane, low, high) = (texels[c], &mut low[c], &mut high[c]);
         for l in 0..LANES {
             let values = each!(|i| plane[i][l]);
             low[l] = least_of(&values);
             high[l] = most_of(&values);
-            total[l] = sum(&values);
         }
     }
 }
@@ -129,26 +174,42 @@ fn diagonal(texels: [&Plane; 3], low: &Channels, high: &Channels, ends: &mut [Re
 
 /// The ends of the stretch of the principal axis that the colours fill.
 #[inline(always)]
-fn principal(texels: [&Plane; 3], low: &Channels, high: &Channels, total: &Channels, ends: &mut [Reals; 2]) {
+fn principal<const WEIGHTED: bool>(
+    texels: [&Plane; 3],
+    weights: &Plane,
+    low: &Channels,
+    high: &Channels,
+    moments: &Moments,
+    ends: &mut [Reals; 2],
+) {
     let mut scale = [0; LANES];
     for l in 0..LANES {
         let widest = (high[0][l] - low[0][l]).max(high[1][l] - low[1][l]).max(high[2][l] - low[2][l]).max(6);
         scale[l] = rounded(HALF_RANGE * 4096.0 / f32::from(widest));
     }
-    let mut covariance = [[0_i16; LANES]; 6];
     let mut centred = [[[0_i16; LANES]; TEXELS]; 3];
     for c in 0..3 {
+        let mut mean = [0; LANES];
+        for l in 0..LANES {
+            mean[l] = rounded(16.0 * moments.values[c][l] / moments.weight[l]);
+        }
         for i in 0..TEXELS {
             for l in 0..LANES {
-                let off = 16 * texels[c][i][l] - total[c][l];
+                let off = 16 * texels[c][i][l] - mean[l];
                 centred[c][i][l] = ((i32::from(off) * i32::from(scale[l])) >> 16) as i16;
             }
         }
     }
     let [red, green, blue] = &centred;
-    for (k, [a, b]) in [[red, red], [red, green], [red, blue], [green, green], [green, blue], [blue, blue]].into_iter().enumerate() {
-        for l in 0..LANES {
-            covariance[k][l] = sum(&each!(|i| a[i][l] * b[i][l]));
+    let mut covariance = [[0.0; LANES]; 6];
+    let pairs = [[red, red], [red, green], [red, blue], [green, green], [green, blue], [blue, blue]];
+    for (covariance, [a, b]) in covariance.iter_mut().zip(pairs) {
+        if WEIGHTED {
+            let mut weighted = [[0; LANES]; TEXELS];
+            products(weights, a, &mut weighted);
+            weighted_sum::<true>(&weighted, b, covariance);
+        } else {
+            weighted_sum::<false>(a, b, covariance);
         }
     }
     let mut axis = [[0_i16; LANES]; 3];
@@ -163,7 +224,7 @@ fn principal(texels: [&Plane; 3], low: &Channels, high: &Channels, total: &Chann
     for c in 0..3 {
         for l in 0..LANES {
             let step = f32::from(axis[c][l]) * 4096.0 / (AXIS * AXIS) / f32::from(scale[l]);
-            let mean = f32::from(total[c][l]) * (1.0 / 16.0);
+            let mean = moments.values[c][l] / moments.weight[l];
             ends[0][c][l] = mean + step * f32::from(most[l]);
             ends[1][c][l] = mean + step * f32::from(least[l]);
         }
@@ -175,12 +236,12 @@ const AXIS: f32 = 128.0;
 
 /// The direction of largest variance, of length [`AXIS`].
 #[inline(always)]
-fn principal_axis(covariance: &[Row; 6], axis: &mut Channels) {
+fn principal_axis(covariance: &[[f32; LANES]; 6], axis: &mut Channels) {
     let [rr, rg, rb, gg, gb, bb] = covariance;
     for l in 0..LANES {
-        let scale = 1.0 / (f32::from(rr[l]) + f32::from(gg[l]) + f32::from(bb[l]) + 1.0);
-        let (rr, rg, rb) = (f32::from(rr[l]) * scale, f32::from(rg[l]) * scale, f32::from(rb[l]) * scale);
-        let (gg, gb, bb) = (f32::from(gg[l]) * scale, f32::from(gb[l]) * scale, f32::from(bb[l]) * scale);
+        let scale = 1.0 / (rr[l] + gg[l] + bb[l] + 1.0);
+        let (rr, rg, rb) = (rr[l] * scale, rg[l] * scale, rb[l] * scale);
+        let (gg, gb, bb) = (gg[l] * scale, gb[l] * scale, bb[l] * scale);
         // The column of the largest variance is never orthogonal to the axis unless it is the axis's own zero.
         let [mut x, mut y, mut z] = if rr > gg { [rr, rg, rb] } else { [rg, gg, gb] };
         if bb > rr && bb > gg {
@@ -226,7 +287,7 @@ fn bits(value: f32, most: f32) -> i16 {
 
 /// The number whose product with a texel's colour falls from `base` to its place between the ends.
 #[inline(always)]
-fn projection(ends: &Ends, weights: &mut Channels, base: &mut Row) {
+fn projection(ends: &Ends, slopes: &mut Channels, base: &mut Row) {
     let [from, to] = &ends.values;
     for l in 0..LANES {
         let r = f32::from(from[0][l] - to[0][l]);
@@ -235,9 +296,9 @@ fn projection(ends: &Ends, weights: &mut Channels, base: &mut Row) {
         let square = r * r + g * g + b * b;
         let scale = (3 << PLACE_BITS) as f32 / (if square > 1.0 { square } else { 1.0 });
         let (r, g, b) = (rounded_signed(r * scale), rounded_signed(g * scale), rounded_signed(b * scale));
-        weights[0][l] = r;
-        weights[1][l] = g;
-        weights[2][l] = b;
+        slopes[0][l] = r;
+        slopes[1][l] = g;
+        slopes[2][l] = b;
         let sum = (r.wrapping_mul(from[0][l])).wrapping_add(g.wrapping_mul(from[1][l]));
         base[l] = sum.wrapping_add(b.wrapping_mul(from[2][l])).wrapping_add(1 << (PLACE_BITS - 1));
     }
@@ -245,58 +306,85 @@ fn projection(ends: &Ends, weights: &mut Channels, base: &mut Row) {
 
 /// The place of a colour between the ends: 0 to 3 thirds of the way.
 #[inline(always)]
-fn place(texels: [&Plane; 3], i: usize, l: usize, weights: &Channels, base: &Row) -> i16 {
-    let r = weights[0][l].wrapping_mul(texels[0][i][l]);
-    let g = weights[1][l].wrapping_mul(texels[1][i][l]);
-    let b = weights[2][l].wrapping_mul(texels[2][i][l]);
+fn place(texels: [&Plane; 3], i: usize, l: usize, slopes: &Channels, base: &Row) -> i16 {
+    let r = slopes[0][l].wrapping_mul(texels[0][i][l]);
+    let g = slopes[1][l].wrapping_mul(texels[1][i][l]);
+    let b = slopes[2][l].wrapping_mul(texels[2][i][l]);
     let place = base[l].wrapping_sub(r).wrapping_sub(g).wrapping_sub(b) >> PLACE_BITS;
     place.max(0).min(3)
 }
 
-/// Moves the ends to the least squares of the places found, as long as that helps.
+/// Moves the ends to the least squares of the places found, and again; keeps what has the least error.
 #[inline(always)]
-fn refine(texels: [&Plane; 3], total: &Channels, ends: &mut Ends, best: &mut [f32; LANES]) {
+fn refine<const WEIGHTED: bool>(texels: [&Plane; 3], weights: &Plane, moments: &Moments, ends: &mut Ends) {
+    let mut best = [f32::INFINITY; LANES];
     let mut tried = Ends { packed: ends.packed, values: ends.values };
-    for round in 0..3 {
-        let (mut weights, mut base) = ([[0; LANES]; 3], [0; LANES]);
-        projection(&tried, &mut weights, &mut base);
-        let mut sums = Sums { places: [0; LANES], squares: [0; LANES], products: [[0; LANES]; 3] };
-        add_up(texels, &weights, &base, &mut sums);
-        keep(&tried, total, &sums, ends, best);
-        if round < 2 {
+    for round in 0..=REFINEMENTS {
+        let (mut slopes, mut base) = ([[0; LANES]; 3], [0; LANES]);
+        projection(&tried, &mut slopes, &mut base);
+        let mut sums = Sums { places: [0.0; LANES], squares: [0.0; LANES], products: [[0.0; LANES]; 3] };
+        add_up::<WEIGHTED>(texels, weights, &slopes, &base, &mut sums);
+        keep(&tried, moments, &sums, ends, &mut best);
+        if round < REFINEMENTS {
             let mut reals = [[[0.0; LANES]; 3]; 2];
-            least_squares(total, &sums, &mut reals);
+            least_squares(moments, &sums, &mut reals);
             quantise(&reals, &mut tried);
         }
     }
 }
 
 #[inline(always)]
-fn add_up(texels: [&Plane; 3], weights: &Channels, base: &Row, sums: &mut Sums) {
+fn add_up<const WEIGHTED: bool>(
+    texels: [&Plane; 3],
+    weights: &Plane,
+    slopes: &Channels,
+    base: &Row,
+    sums: &mut Sums,
+) {
+    let mut places = [[0; LANES]; TEXELS];
+    for i in 0..TEXELS {
+        for l in 0..LANES {
+            places[i][l] = place(texels, i, l, slopes, base);
+        }
+    }
+    let mut weighted = places;
+    if WEIGHTED {
+        products(weights, &places, &mut weighted);
+    }
     for l in 0..LANES {
-        let places = each!(|i| place(texels, i, l, weights, base));
-        sums.places[l] = sum(&places);
-        sums.squares[l] = sum(&each!(|i| places[i] * places[i]));
-        sums.products[0][l] = sum(&each!(|i| places[i] * texels[0][i][l]));
-        sums.products[1][l] = sum(&each!(|i| places[i] * texels[1][i][l]));
-        sums.products[2][l] = sum(&each!(|i| places[i] * texels[2][i][l]));
+        sums.places[l] = f32::from(sum(&each!(|i| weighted[i][l])));
+    }
+    for l in 0..LANES {
+        sums.squares[l] = f32::from(sum(&each!(|i| weighted[i][l] * places[i][l])));
+    }
+    for c in 0..3 {
+        weighted_sum::<WEIGHTED>(&weighted, texels[c], &mut sums.products[c]);
+    }
+}
+
+/// Products of two planes that fit 16 bits.
+#[inline(always)]
+fn products(a: &Plane, b: &Plane, out: &mut Plane) {
+    for i in 0..TEXELS {
+        for l in 0..LANES {
+            out[i][l] = a[i][l] * b[i][l];
+        }
     }
 }
 
 /// Takes what was tried where its error is the least.
 #[inline(always)]
-fn keep(tried: &Ends, total: &Channels, sums: &Sums, ends: &mut Ends, best: &mut [f32; LANES]) {
+fn keep(tried: &Ends, moments: &Moments, sums: &Sums, ends: &mut Ends, best: &mut [f32; LANES]) {
     // Without the squares of the values, which are the same for all that is tried.
     let mut errors = [0.0; LANES];
     for c in 0..3 {
         let (from, to) = (&tried.values[0][c], &tried.values[1][c]);
-        let (total, products) = (&total[c], &sums.products[c]);
+        let (total, products) = (&moments.values[c], &sums.products[c]);
         for l in 0..LANES {
-            let (places, squares) = (f32::from(sums.places[l]), f32::from(sums.squares[l]));
             let step = f32::from(to[l] - from[l]) * (1.0 / 3.0);
             let from = f32::from(from[l]);
-            errors[l] += from * (16.0 * from - 2.0 * f32::from(total[l]))
-                + step * (step * squares + 2.0 * (from * places - f32::from(products[l])));
+            errors[l] += from * (moments.weight[l] * from - 2.0 * total[l])
+                + step * (step * sums.squares[l] + 2.0 * (from * sums.places[l] - products[l]));
         }
     }
     let mut better = [0_i16; LANES];
@@ -320,21 +408,19 @@ fn keep(tried: &Ends, total: &Channels, sums: &Sums, ends: &mut Ends, best: &mut
 
 /// The ends that fit the texels best where they are placed now; their mean, twice, if they are all at one place.
 #[inline(always)]
-fn least_squares(total: &Channels, sums: &Sums, ends: &mut [Reals; 2]) {
-    let (mut inverse, mut places) = ([0.0; LANES], [0.0; LANES]);
+fn least_squares(moments: &Moments, sums: &Sums, ends: &mut [Reals; 2]) {
+    let mut inverse = [0.0; LANES];
     for l in 0..LANES {
-        places[l] = f32::from(sums.places[l]);
-        let determinant = 16.0 * f32::from(sums.squares[l]) - places[l] * places[l];
-        // Whole numbers, and at least 15 unless all places are the same.
+        let determinant = moments.weight[l] * sums.squares[l] - sums.places[l] * sums.places[l];
+        // Whole numbers, and more than 0 unless all places are the same.
         inverse[l] = if determinant > 0.5 { 1.0 / determinant } else { 0.0 };
     }
     let [from, to] = ends;
     for c in 0..3 {
-        let (total, products, from, to) = (&total[c], &sums.products[c], &mut from[c], &mut to[c]);
+        let (total, products, from, to) = (&moments.values[c], &sums.products[c], &mut from[c], &mut to[c]);
         for l in 0..LANES {
-            let total = f32::from(total[l]);
-            let slope = (16.0 * f32::from(products[l]) - places[l] * total) * inverse[l];
-            let start = (total - slope * places[l]) * (1.0 / 16.0);
+            let slope = (moments.weight[l] * products[l] - sums.places[l] * total[l]) * inverse[l];
+            let start = (total[l] - slope * sums.places[l]) / moments.weight[l];
             from[l] = start;
             to[l] = start + 3.0 * slope;
         }
@@ -344,11 +430,11 @@ fn least_squares(total: &Channels, sums: &Sums, ends: &mut [Reals; 2]) {
 /// The bytes of the blocks, in the order of ends that says "four colours".
 #[inline(always)]
 fn pack(texels: [&Plane; 3], ends: &Ends, blocks: &mut [Words; LANES]) {
-    let (mut weights, mut base) = ([[0; LANES]; 3], [0; LANES]);
-    projection(ends, &mut weights, &mut base);
+    let (mut slopes, mut base) = ([[0; LANES]; 3], [0; LANES]);
+    projection(ends, &mut slopes, &mut base);
     let mut words = [[0_u16; LANES]; 4];
     for l in 0..LANES {
-        let places = each!(|i| place(texels, i, l, &weights, &base) as u16);
+        let places = each!(|i| place(texels, i, l, &slopes, &base) as u16);
         let halves = [eight(&places, 0), eight(&places, 8)];
         let (from, to) = (ends.packed[0][l] as u16, ends.packed[1][l] as u16);
         // 0 and 1 change places with the ends, 2 and 3 too.

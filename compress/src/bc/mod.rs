@@ -257,12 +257,14 @@ fn encode_into(
     if format == BlockFormat::Bc4 {
         let (voxels, _) = samples.as_chunks::<1>();
         block::encode_rows(voxels, extent, blocks, 8, |rows, blocks| {
-            encode_scalar_row(rows.map(|row| row.as_flattened()), blocks, options, simd);
+            for (rows, blocks) in rows.zip(blocks.chunks_mut(extent.blocks()[0] * 8)) {
+                encode_scalar_row(rows.map(|row| row.as_flattened()), blocks, options, simd);
+            }
         });
     } else {
         let (voxels, _) = samples.as_chunks::<4>();
         block::encode_rows(voxels, extent, blocks, format.block_bytes(), |rows, blocks| {
-            encode_row(format, rows, blocks, options, simd);
+            encode_rows(format, rows, extent.blocks()[0], blocks, options, simd);
         });
     }
 }
@@ -321,11 +323,28 @@ pub(crate) fn encode_row(
     options: EncodeOptions,
     simd: Simd,
 ) {
+    let across = out.len() / format.block_bytes();
+    encode_rows(format, std::iter::once(rows), across, out, options, simd);
+}
+
+/// Encodes rows of blocks of colours, `across` blocks each, see [`encode_row`].
+fn encode_rows<'a>(
+    format: BlockFormat,
+    rows: impl Iterator<Item = [&'a [[u8; 4]]; 4]>,
+    across: usize,
+    out: &mut [u8],
+    options: EncodeOptions,
+    simd: Simd,
+) {
     match format {
-        BlockFormat::Bc1 => rows::encode_colours::<8>(rows, out.as_chunks_mut().0, options, simd),
-        BlockFormat::Bc7 => bc7::encode_row(rows, out, options),
+        BlockFormat::Bc1 => rows::encode_colours::<8>(rows, across, out.as_chunks_mut().0, options, simd),
+        BlockFormat::Bc7 => {
+            for (rows, out) in rows.zip(out.chunks_mut(across.max(1) * format.block_bytes())) {
+                bc7::encode_row(rows, out, options);
+            }
+        }
         BlockFormat::Bc3 | BlockFormat::Bc4 => {
-            rows::encode_colours::<16>(rows, out.as_chunks_mut().0, options, simd);
+            rows::encode_colours::<16>(rows, across, out.as_chunks_mut().0, options, simd);
         }
     }
 }

@@ -3,7 +3,8 @@
 
 use super::batch::{EDGE, LANES, Plane, Strip, Words, colour_planes, scalar_plane};
 use super::endpoints::TEXELS;
-use super::{EncodeOptions, bc1, colour, scalar};
+use super::scalar::{self, Effort};
+use super::{ColourWeight, EncodeOptions, Level, bc1, colour};
 use crate::simd::Simd;
 
 /// Encodes one row of blocks of BC4: `rows` are its four rows of voxels, of one length each, `out` a block for each
@@ -29,24 +30,28 @@ pub(super) fn encode_scalars(rows: [&[u8]; EDGE], out: &mut [[u8; 8]], options: 
     }
 }
 
-/// Encodes one row of blocks of BC1, if they have 8 bytes, or BC3, see [`encode_scalars`].
-pub(super) fn encode_colours<const BYTES: usize>(
-    rows: [&[[u8; 4]]; EDGE],
+/// Encodes rows of blocks of BC1, if they have 8 bytes, or BC3, `across` blocks each; see [`encode_scalars`].
+pub(super) fn encode_colours<'a, const BYTES: usize>(
+    rows: impl Iterator<Item = [&'a [[u8; 4]]; EDGE]>,
+    across: usize,
     out: &mut [[u8; BYTES]],
     options: EncodeOptions,
     simd: Simd,
 ) {
     let mut batch = Batch::new();
     let mut last = ([0; 4], constant::<BYTES>([0; 4]));
-    for place in 0..out.len() {
-        let fours = rows.map(|row| four(row, place));
-        if let Some(texel) = one_texel(&fours) {
-            if texel != last.0 {
-                last = (texel, constant(texel));
+    for (begin, rows) in (0..out.len()).step_by(across.max(1)).zip(rows) {
+        for place in 0..across {
+            let fours =
+                [four(rows[0], place), four(rows[1], place), four(rows[2], place), four(rows[3], place)];
+            if let Some(texel) = one_texel(&fours) {
+                if texel != last.0 {
+                    last = (texel, constant(texel));
+                }
+                out[begin + place] = last.1;
+            } else if batch.push(&fours, begin + place) {
+                batch.flush(out, options, simd);
             }
-            out[place] = last.1;
-        } else if batch.push(&fours, place) {
-            batch.flush(out, options, simd);
         }
     }
     batch.flush(out, options, simd);
@@ -63,9 +68,15 @@ fn four(row: &[[u8; 4]], place: usize) -> [[u8; 4]; EDGE] {
 
 /// The texel that all 16 are, if they are.
 fn one_texel(fours: &[[[u8; 4]; EDGE]; EDGE]) -> Option<[u8; 4]> {
-    let [a, b, c, d] = fours;
-    let [x, y, z, w] = a;
-    (a == b && a == c && a == d && x == y && x == z && x == w).then_some(*x)
+    let [a, b, c, d] = [word(&fours[0]), word(&fours[1]), word(&fours[2]), word(&fours[3])];
+    let off = (a ^ b) | (a ^ c) | (a ^ d) | (a ^ a.rotate_left(32));
+    (off == 0).then_some(fours[0][0])
+}
+
+/// The bytes of four texels as one number.
+fn word([a, b, c, d]: &[[u8; 4]; EDGE]) -> u128 {
+    let [a, b, c, d] = [*a, *b, *c, *d].map(|texel| u128::from(u32::from_le_bytes(texel)));
+    a | b << 32 | c << 64 | d << 96
 }
 
 /// The block of one colour.
@@ -156,7 +167,11 @@ fn scalars_avx2(strip: [&[u8; LANES * EDGE]; EDGE], options: EncodeOptions, bloc
 fn scalars_plain(strip: [&[u8; LANES * EDGE]; EDGE], options: EncodeOptions, blocks: &mut [Words; LANES]) {
     let mut plane: Plane = [[0; LANES]; TEXELS];
     scalar_plane(strip, &mut plane);
-    scalar::encode(&plane, options.level, blocks);
+    let effort = match options.level {
+        Level::Fast => Effort::Range,
+        Level::Best => Effort::Searched,
+    };
+    scalar::encode(&plane, effort, blocks);
 }
 
 /// The blocks of a strip of four channels: those of alpha, if it is asked for, and those of colour.
@@ -201,7 +216,15 @@ fn colours_plain(
     let mut planes: [Plane; 4] = [[[0; LANES]; TEXELS]; 4];
     colour_planes(strip, &mut planes);
     if with_alpha {
-        scalar::encode(&planes[3], options.level, alphas);
+        let effort = match options.level {
+            Level::Fast => Effort::Range,
+            Level::Best => Effort::Fitted,
+        };
+        scalar::encode(&planes[3], effort, alphas);
     }
-    colour::encode(&planes, with_alpha, options, colours);
+    if with_alpha && options.colour_weight == ColourWeight::Alpha && options.level == Level::Best {
+        colour::encode::<true>(&planes, options.level, colours);
+    } else {
+        colour::encode::<false>(&planes, options.level, colours);
+    }
 }

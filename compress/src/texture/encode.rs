@@ -15,8 +15,8 @@ use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
 use super::{EncodeStats, Part};
-use crate::bc::{self, EncodeOptions, Level};
 use crate::BlockFormat;
+use crate::bc::{self, EncodeOptions, Level};
 use crate::simd::Simd;
 
 /// Voxels of a block along x, and along y.
@@ -239,7 +239,8 @@ fn colour_task<const BYTES: usize>(
 ) -> EncodeStats {
     let mut stats = EncodeStats { blocks: blocks.len() as u64, ..EncodeStats::default() };
     let Scratch { strip, curve, colours, known, .. } = scratch;
-    let encode = |rows: [&[[u8; 4]]; EDGE], out: &mut [u8]| bc::encode_row(format, rows, out, job.options, job.simd);
+    let encode =
+        |rows: [&[[u8; 4]]; EDGE], out: &mut [u8]| bc::encode_row(format, rows, out, job.options, job.simd);
     let constants = table.constants();
     let constant = |run: u16| {
         let constant = &constants[usize::from(run)];

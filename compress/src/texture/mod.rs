@@ -89,7 +89,9 @@ pub enum TextureError {
         high: f64,
     },
     /// The mapping was made for samples of another type.
-    #[error("the samples are {samples:?}, but their mapping was made for {mapping:?}: make it for their type")]
+    #[error(
+        "the samples are {samples:?}, but their mapping was made for {mapping:?}: make it for their type"
+    )]
     Kind {
         /// Type of the samples.
         samples: SampleKind,
@@ -97,7 +99,9 @@ pub enum TextureError {
         mapping: SampleKind,
     },
     /// The mapping does not make what the format holds.
-    #[error("the mapping does not suit the format: colours need a table, opaque for BC1, and scalars a window")]
+    #[error(
+        "the mapping does not suit the format: colours need a table, opaque for BC1, and scalars a window"
+    )]
     Mapping,
     /// The bricks are not those of the grid.
     #[error("{found} bricks were given for a grid of {expected}: give the range of each brick")]
@@ -238,9 +242,9 @@ impl<'a> Source<'a> {
     pub fn with_bricks(mut self, bricks: Bricks<'_>) -> Result<Self, TextureError> {
         let grid = self.volume.grid();
         self.skip = Some(match self.mapping {
-            Mapping::Colours(table) => SkipMap::new(bricks, grid, |range| {
-                table.run(range.map(|value| table.domain().index(value)))
-            }),
+            Mapping::Colours(table) => {
+                SkipMap::new(bricks, grid, |range| table.run(range.map(|value| table.domain().index(value))))
+            }
             Mapping::Scalars(window) => SkipMap::new(bricks, grid, |range| {
                 let [low, high] = range.map(|value| window.texel(window.domain().index(value)));
                 (low == high).then_some(low.into())
@@ -393,11 +397,7 @@ impl<'a> Source<'a> {
 }
 
 fn check_len(bytes: &[u8], expected: usize) -> Result<(), TextureError> {
-    if bytes.len() == expected {
-        Ok(())
-    } else {
-        Err(TextureError::Length { expected, found: bytes.len() })
-    }
+    if bytes.len() == expected { Ok(()) } else { Err(TextureError::Length { expected, found: bytes.len() }) }
 }
 
 fn allocated(bytes: usize) -> Result<Vec<u8>, TextureError> {
