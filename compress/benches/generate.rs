@@ -13,7 +13,9 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use compress::bc::{EncodeOptions, Level};
-use compress::texture::{ColourPoint, ColourTable, Mapping, SampleKind, Samples, Source, TexelFormat, Volume};
+use compress::texture::{
+    ColourPoint, ColourTable, Mapping, SampleKind, Samples, Source, TexelFormat, Volume,
+};
 use compress::{BlockFormat, Extent3};
 
 /// Rounds, and the seconds after which a volume has had enough of them.
@@ -141,7 +143,10 @@ fn main() {
             let table = black_box(table(points, volume.kind()));
             let table_us = begin.elapsed().as_secs_f64() * 1e6;
             let source = Source::new(volume, Mapping::Colours(&table)).unwrap();
-            measure(&format!(r#""volume":"{name}","function":"{function}","table_us":{table_us:.0}"#), &source);
+            measure(
+                &format!(r#""volume":"{name}","function":"{function}","table_us":{table_us:.0}"#),
+                &source,
+            );
         }
     }
 }

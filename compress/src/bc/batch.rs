@@ -18,8 +18,8 @@ pub(super) type Row = [i16; LANES];
 /// One number for each texel of each block of a batch, by texel.
 pub(super) type Plane = [Row; TEXELS];
 
-/// Rows of a batch's blocks side by side; `N` bytes a texel.
-pub(super) type Strip<const N: usize> = [[[u8; N]; LANES * EDGE]; EDGE];
+/// The texels of a batch, by texel and lane.
+pub(super) type Texels = [[[u8; 4]; LANES]; TEXELS];
 
 /// A block of 8 bytes, as four little-endian numbers.
 pub(super) type Words = [u16; 4];
@@ -50,6 +50,14 @@ macro_rules! each {
     };
 }
 pub(super) use each;
+
+/// Takes `new` where `mask` is all ones, and leaves what is there where it is 0.
+#[inline(always)]
+pub(super) fn choose(mask: &Row, new: &Row, out: &mut Row) {
+    for l in 0..LANES {
+        out[l] ^= (out[l] ^ new[l]) & mask[l];
+    }
+}
 
 /// The sum of all texels.
 #[inline(always)]
@@ -106,20 +114,18 @@ pub(super) fn scalar_plane(strip: [&[u8; LANES * EDGE]; EDGE], plane: &mut Plane
     }
 }
 
-/// Four channels, by channel and texel.
+/// Four channels of texels that lie by texel and lane, by channel, texel and lane.
 #[inline(always)]
-pub(super) fn colour_planes(strip: &Strip<4>, [red, green, blue, alpha]: &mut [Plane; 4]) {
-    for (j, row) in strip.iter().enumerate() {
-        for k in 0..EDGE {
-            let i = EDGE * j + k;
-            let (red, green, blue, alpha) = (&mut red[i], &mut green[i], &mut blue[i], &mut alpha[i]);
-            for l in 0..LANES {
-                let word = u32::from_le_bytes(row[EDGE * l + k]);
-                red[l] = (word & 255) as i16;
-                green[l] = (word >> 8 & 255) as i16;
-                blue[l] = (word >> 16 & 255) as i16;
-                alpha[l] = (word >> 24) as i16;
-            }
+pub(super) fn colour_planes(texels: &Texels, [red, green, blue, alpha]: &mut [Plane; 4]) {
+    for i in 0..TEXELS {
+        let (row, red, green) = (&texels[i], &mut red[i], &mut green[i]);
+        let (blue, alpha) = (&mut blue[i], &mut alpha[i]);
+        for l in 0..LANES {
+            let word = u32::from_le_bytes(row[l]);
+            red[l] = (word & 255) as i16;
+            green[l] = (word >> 8 & 255) as i16;
+            blue[l] = (word >> 16 & 255) as i16;
+            alpha[l] = (word >> 24) as i16;
         }
     }
 }

@@ -1,7 +1,8 @@
 //! The kernel of BC1, and of colour in BC3: a batch of blocks at a time, see `batch`.
 
 use super::batch::{
-    LANES, Plane, ROUND, Row, Words, each, interleave, least_of, most_of, rounded, rounded_signed, sum,
+    LANES, Plane, ROUND, Row, Words, choose, each, interleave, least_of, most_of, rounded, rounded_signed,
+    sum,
 };
 use super::endpoints::TEXELS;
 use super::{Level, bc1};
@@ -65,10 +66,9 @@ pub(super) fn encode<const WEIGHTED: bool>(planes: &[Plane; 4], level: Level, bl
     let mut weights = [[1; LANES]; TEXELS];
     let mut moments = Moments { weight: [16.0; LANES], values: [[0.0; LANES]; 3] };
     if WEIGHTED {
-        for i in 0..TEXELS {
-            for l in 0..LANES {
-                weights[i][l] = (alpha[i][l] + UNSEEN_WEIGHT + 4) >> 3;
-            }
+        for l in 0..LANES {
+            let shares = each!(|i| (alpha[i][l] + UNSEEN_WEIGHT + 4) >> 3);
+            each!(|i| weights[i][l] = shares[i]);
         }
     }
     moments_of::<WEIGHTED>(texels, &weights, &mut moments);
@@ -111,9 +111,10 @@ fn moments_of<const WEIGHTED: bool>(texels: [&Plane; 3], weights: &Plane, moment
 fn weighted_sum<const WEIGHTED: bool>(factors: &Plane, values: &Plane, out: &mut [f32; LANES]) {
     for l in 0..LANES {
         if WEIGHTED {
-            let mut sum = 0;
-            for i in 0..TEXELS {
-                sum += i32::from(factors[i][l]) * i32::from(values[i][l]);
+            let products = each!(|i| i32::from(factors[i][l]) * i32::from(values[i][l]));
+            let mut sum = products[0];
+            for product in &products[1..] {
+                sum += product;
             }
             out[l] = sum as f32;
         } else {
@@ -193,11 +194,11 @@ fn principal<const WEIGHTED: bool>(
         for l in 0..LANES {
             mean[l] = rounded(16.0 * moments.values[c][l] / moments.weight[l]);
         }
-        for i in 0..TEXELS {
-            for l in 0..LANES {
-                let off = 16 * texels[c][i][l] - mean[l];
-                centred[c][i][l] = ((i32::from(off) * i32::from(scale[l])) >> 16) as i16;
-            }
+        let (values, centred) = (texels[c], &mut centred[c]);
+        for l in 0..LANES {
+            let scale = i32::from(scale[l]);
+            let off = each!(|i| ((i32::from(16 * values[i][l] - mean[l]) * scale) >> 16) as i16);
+            each!(|i| centred[i][l] = off[i]);
         }
     }
     let [red, green, blue] = &centred;
@@ -342,10 +343,9 @@ fn add_up<const WEIGHTED: bool>(
     sums: &mut Sums,
 ) {
     let mut places = [[0; LANES]; TEXELS];
-    for i in 0..TEXELS {
-        for l in 0..LANES {
-            places[i][l] = place(texels, i, l, slopes, base);
-        }
+    for l in 0..LANES {
+        let found = each!(|i| place(texels, i, l, slopes, base));
+        each!(|i| places[i][l] = found[i]);
     }
     let mut weighted = places;
     if WEIGHTED {
@@ -365,10 +365,9 @@ fn add_up<const WEIGHTED: bool>(
 /// Products of two planes that fit 16 bits.
 #[inline(always)]
 fn products(a: &Plane, b: &Plane, out: &mut Plane) {
-    for i in 0..TEXELS {
-        for l in 0..LANES {
-            out[i][l] = a[i][l] * b[i][l];
-        }
+    for l in 0..LANES {
+        let products = each!(|i| a[i][l] * b[i][l]);
+        each!(|i| out[i][l] = products[i]);
     }
 }
 
@@ -387,22 +386,17 @@ fn keep(tried: &Ends, moments: &Moments, sums: &Sums, ends: &mut Ends, best: &mu
                 + step * (step * sums.squares[l] + 2.0 * (from * sums.places[l] - products[l]));
         }
     }
-    let mut better = [0_i16; LANES];
+    // All ones where this is better. Masks, since of a choice the compiler makes one between addresses.
+    let mut better = [0; LANES];
     for l in 0..LANES {
         better[l] = if errors[l] < best[l] { -1 } else { 0 };
-        best[l] = if errors[l] < best[l] { errors[l] } else { best[l] };
+        best[l] = best[l].min(errors[l]);
     }
-    for end in 0..2 {
-        for l in 0..LANES {
-            let (old, new) = (ends.packed[end][l], tried.packed[end][l]);
-            ends.packed[end][l] = if better[l] < 0 { new } else { old };
-        }
-        for c in 0..3 {
-            for l in 0..LANES {
-                let (old, new) = (ends.values[end][c][l], tried.values[end][c][l]);
-                ends.values[end][c][l] = if better[l] < 0 { new } else { old };
-            }
-        }
+    for (ends, tried) in ends.packed.iter_mut().zip(&tried.packed) {
+        choose(&better, tried, ends);
+    }
+    for (ends, tried) in ends.values.as_flattened_mut().iter_mut().zip(tried.values.as_flattened()) {
+        choose(&better, tried, ends);
     }
 }
 

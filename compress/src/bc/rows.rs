@@ -1,7 +1,7 @@
 //! From rows of voxels to blocks of BC1, BC3 and BC4: what is constant is written at once, the rest goes to the kernels
 //! in batches.
 
-use super::batch::{EDGE, LANES, Plane, Strip, Words, colour_planes, scalar_plane};
+use super::batch::{EDGE, LANES, Plane, Texels, Words, colour_planes, scalar_plane};
 use super::endpoints::TEXELS;
 use super::scalar::{self, Effort};
 use super::{ColourWeight, EncodeOptions, Level, bc1, colour};
@@ -97,7 +97,7 @@ fn bytes([a, b, c, d]: Words) -> [u8; 8] {
 
 /// Blocks of colours that wait for the kernels.
 struct Batch {
-    rows: Strip<4>,
+    texels: Texels,
     /// Which block of the output each is.
     at: [u32; LANES],
     len: usize,
@@ -105,13 +105,13 @@ struct Batch {
 
 impl Batch {
     fn new() -> Self {
-        Self { rows: [[[0; 4]; LANES * EDGE]; EDGE], at: [0; LANES], len: 0 }
+        Self { texels: [[[0; 4]; LANES]; TEXELS], at: [0; LANES], len: 0 }
     }
 
     /// Adds a block that goes to place `at`; says whether the batch is full.
     fn push(&mut self, fours: &[[[u8; 4]; EDGE]; EDGE], at: usize) -> bool {
-        for (row, four) in self.rows.iter_mut().zip(fours) {
-            row.as_chunks_mut::<EDGE>().0[self.len] = *four;
+        for (row, texel) in self.texels.iter_mut().zip(fours.as_flattened()) {
+            row[self.len] = *texel;
         }
         self.at[self.len] = at as u32;
         self.len += 1;
@@ -124,7 +124,7 @@ impl Batch {
             return;
         }
         let mut blocks = [[[0; 4]; LANES]; 2];
-        colours(&self.rows, BYTES == 16, options, simd, &mut blocks);
+        colours(&self.texels, BYTES == 16, options, simd, &mut blocks);
         let [alphas, colours] = blocks;
         for ((alpha, colour), at) in alphas.into_iter().zip(colours).zip(&self.at[..self.len]) {
             let (alphas, colours) = out[*at as usize].split_at_mut(BYTES - 8);
@@ -176,20 +176,20 @@ fn scalars_plain(strip: [&[u8; LANES * EDGE]; EDGE], options: EncodeOptions, blo
 
 /// The blocks of a strip of four channels: those of alpha, if it is asked for, and those of colour.
 fn colours(
-    strip: &Strip<4>,
+    texels: &Texels,
     with_alpha: bool,
     options: EncodeOptions,
     simd: Simd,
     blocks: &mut [[Words; LANES]; 2],
 ) {
     match simd {
-        Simd::Plain => colours_plain(strip, with_alpha, options, blocks),
+        Simd::Plain => colours_plain(texels, with_alpha, options, blocks),
         #[cfg(target_arch = "x86_64")]
         Simd::Avx2(_) => {
             #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
             // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
             unsafe {
-                colours_avx2(strip, with_alpha, options, blocks);
+                colours_avx2(texels, with_alpha, options, blocks);
             }
         }
     }
@@ -197,24 +197,19 @@ fn colours(
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-fn colours_avx2(
-    strip: &Strip<4>,
-    with_alpha: bool,
-    options: EncodeOptions,
-    blocks: &mut [[Words; LANES]; 2],
-) {
-    colours_plain(strip, with_alpha, options, blocks);
+fn colours_avx2(texels: &Texels, with_alpha: bool, options: EncodeOptions, blocks: &mut [[Words; LANES]; 2]) {
+    colours_plain(texels, with_alpha, options, blocks);
 }
 
 #[inline(always)]
 fn colours_plain(
-    strip: &Strip<4>,
+    texels: &Texels,
     with_alpha: bool,
     options: EncodeOptions,
     [alphas, colours]: &mut [[Words; LANES]; 2],
 ) {
     let mut planes: [Plane; 4] = [[[0; LANES]; TEXELS]; 4];
-    colour_planes(strip, &mut planes);
+    colour_planes(texels, &mut planes);
     if with_alpha {
         let effort = match options.level {
             Level::Fast => Effort::Range,

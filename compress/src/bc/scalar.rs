@@ -6,7 +6,7 @@
 //! What has the least error of all tried is kept, measured against the values that the decoder gives. A block whose
 //! values span at most 7 is kept exactly at every effort.
 
-use super::batch::{LANES, Plane, Row, Words, each, interleave, least_of, most_of, rounded, sum};
+use super::batch::{LANES, Plane, Row, Words, choose, each, interleave, least_of, most_of, rounded, sum};
 use super::endpoints::TEXELS;
 
 /// How much is tried.
@@ -70,10 +70,10 @@ pub(super) fn encode(plane: &Plane, effort: Effort, blocks: &mut [Words; LANES])
             let fifths = refined::<FIFTHS>(plane, low, high, effort);
             let mut others = [[0; LANES]; 4];
             pack_fifths(plane, &fifths, &mut others);
-            for k in 0..4 {
+            for (word, other) in words.iter_mut().zip(&others) {
                 for l in 0..LANES {
-                    let (old, new) = (words[k][l], others[k][l]);
-                    words[k][l] = if fifths.error[l] < sevenths.error[l] { new } else { old };
+                    let better = if fifths.error[l] < sevenths.error[l] { u16::MAX } else { 0 };
+                    word[l] ^= (word[l] ^ other[l]) & better;
                 }
             }
         }
@@ -178,13 +178,13 @@ fn try_ends<const STEPS: i16>(plane: &Plane, low: &Row, high: &Row, best: &mut F
         let off = each!(|i| off::<STEPS>(plane[i][l], low[l], high[l], scale[l]).min(MOST_OFF));
         error[l] = sum(&each!(|i| off[i] * off[i]));
     }
+    let mut better = [0; LANES];
     for l in 0..LANES {
-        let better = error[l] < best.error[l];
-        let (old_low, old_high) = (best.low[l], best.high[l]);
-        best.low[l] = if better { low[l] } else { old_low };
-        best.high[l] = if better { high[l] } else { old_high };
+        better[l] = if error[l] < best.error[l] { -1 } else { 0 };
         best.error[l] = best.error[l].min(error[l]);
     }
+    choose(&better, low, &mut best.low);
+    choose(&better, high, &mut best.high);
 }
 
 /// Moves the end points to those that fit the values best where they are placed now, if that defines any.
@@ -209,6 +209,7 @@ fn least_squares<const STEPS: i16>(plane: &Plane, low: &mut Row, high: &mut Row)
         totals[l] = sum(&each!(|i| plane[i][l] & on_line[i]));
         products[l] = sum(&each!(|i| at[i] * plane[i][l]));
     }
+    let (mut lows, mut highs, mut defined) = ([0; LANES], [0; LANES], [0; LANES]);
     for l in 0..LANES {
         let (count, place) = (f32::from(counts[l]), f32::from(places[l]));
         let (total, product) = (f32::from(totals[l]), f32::from(products[l]));
@@ -217,11 +218,15 @@ fn least_squares<const STEPS: i16>(plane: &Plane, low: &mut Row, high: &mut Row)
         let step = (count * product - place * total) * inverse;
         let start = (total - step * place) / if count > 0.5 { count } else { 1.0 };
         let (new_low, new_high) = (clamped(start + f32::from(STEPS) * step), clamped(start));
-        let defined = determinant > 0.5 && new_low < new_high;
-        let (old_low, old_high) = (low[l], high[l]);
-        low[l] = if defined { new_low } else { old_low };
-        high[l] = if defined { new_high } else { old_high };
+        lows[l] = new_low;
+        highs[l] = new_high;
+        defined[l] = if determinant > 0.5 { -1 } else { 0 };
     }
+    for l in 0..LANES {
+        defined[l] &= if lows[l] < highs[l] { -1 } else { 0 };
+    }
+    choose(&defined, &lows, low);
+    choose(&defined, &highs, high);
 }
 
 /// A value of 8 bits, rounded to the nearest.
