@@ -4,8 +4,8 @@ use super::batch::{
     LANES, Plane, ROUND, Row, Words, choose, each, interleave, least_of, most_of, rounded, rounded_signed,
     sum,
 };
+use super::bc1;
 use super::endpoints::TEXELS;
-use super::{Level, bc1};
 
 /// Weight of a voxel of alpha 0, in units of alpha: 1/32 of an opaque voxel. Measured on a CT: seen colour is
 /// within 0.03 dB of what no weight at all gives it, and unseen colour, which linear filtering mixes into seen
@@ -17,7 +17,7 @@ const UNSEEN_WEIGHT: i16 = 8;
 const POWER_ROUNDS: usize = 4;
 
 /// Rounds of least squares.
-const REFINEMENTS: usize = 2;
+const REFINEMENTS: usize = 1;
 
 /// Half the widest range of a block, in the whole numbers that its principal axis is found in: 16 products fit 16 bits.
 const HALF_RANGE: f32 = 45.0;
@@ -41,8 +41,9 @@ struct Ends {
 
 /// Sums over a block's texels, by weight.
 struct Moments {
-    /// Of the weights.
+    /// Of the weights, and one over that.
     weight: [f32; LANES],
+    share: [f32; LANES],
     /// Of the values.
     values: Reals,
 }
@@ -56,15 +57,20 @@ struct Sums {
     products: Reals,
 }
 
-/// The blocks of the first three planes; `WEIGHTED` by alpha, the fourth, at [`Level::Best`].
+/// The blocks of the first three planes, at [`super::Level::Best`] or fast; the best may be `WEIGHTED` by alpha, the
+/// fourth.
 #[inline(always)]
-pub(super) fn encode<const WEIGHTED: bool>(planes: &[Plane; 4], level: Level, blocks: &mut [Words; LANES]) {
+pub(super) fn encode<const BEST: bool, const WEIGHTED: bool>(
+    planes: &[Plane; 4],
+    blocks: &mut [Words; LANES],
+) {
     let [red, green, blue, alpha] = planes;
     let texels = [red, green, blue];
     let (mut low, mut high) = ([[0; LANES]; 3], [[0; LANES]; 3]);
     range(texels, &mut low, &mut high);
     let mut weights = [[1; LANES]; TEXELS];
-    let mut moments = Moments { weight: [16.0; LANES], values: [[0.0; LANES]; 3] };
+    let mut moments =
+        Moments { weight: [16.0; LANES], share: [1.0 / 16.0; LANES], values: [[0.0; LANES]; 3] };
     if WEIGHTED {
         for l in 0..LANES {
             let shares = each!(|i| (alpha[i][l] + UNSEEN_WEIGHT + 4) >> 3);
@@ -74,18 +80,18 @@ pub(super) fn encode<const WEIGHTED: bool>(planes: &[Plane; 4], level: Level, bl
     moments_of::<WEIGHTED>(texels, &weights, &mut moments);
     let mut reals = [[[0.0; LANES]; 3]; 2];
     let mut ends = Ends { packed: [[0; LANES]; 2], values: [[[0; LANES]; 3]; 2] };
-    if level == Level::Fast {
-        diagonal(texels, &low, &high, &mut reals);
-        quantise(&reals, &mut ends);
-    } else {
+    if BEST {
         principal::<WEIGHTED>(texels, &weights, &low, &high, &moments, &mut reals);
         quantise(&reals, &mut ends);
         refine::<WEIGHTED>(texels, &weights, &moments, &mut ends);
+    } else {
+        diagonal(texels, &low, &high, &mut reals);
+        quantise(&reals, &mut ends);
     }
     pack(texels, &ends, blocks);
     for l in 0..LANES {
         if ends.packed[0][l] == ends.packed[1][l] {
-            let mean = |c: usize| (moments.values[c][l] / moments.weight[l] + 0.5) as u8;
+            let mean = |c: usize| (moments.values[c][l] * moments.share[l] + 0.5) as u8;
             let block = u64::from_le_bytes(bc1::solid([mean(0), mean(1), mean(2)]));
             blocks[l] = [block as u16, (block >> 16) as u16, (block >> 32) as u16, (block >> 48) as u16];
         }
@@ -98,6 +104,7 @@ fn moments_of<const WEIGHTED: bool>(texels: [&Plane; 3], weights: &Plane, moment
     if WEIGHTED {
         for l in 0..LANES {
             moments.weight[l] = f32::from(sum(&each!(|i| weights[i][l])));
+            moments.share[l] = 1.0 / moments.weight[l];
         }
     }
     for c in 0..3 {
@@ -109,17 +116,29 @@ fn moments_of<const WEIGHTED: bool>(texels: [&Plane; 3], weights: &Plane, moment
 /// sum fits 16 bits; with it they are 33 times that.
 #[inline(always)]
 fn weighted_sum<const WEIGHTED: bool>(factors: &Plane, values: &Plane, out: &mut [f32; LANES]) {
-    for l in 0..LANES {
-        if WEIGHTED {
+    if WEIGHTED {
+        for l in 0..LANES {
             let products = each!(|i| i32::from(factors[i][l]) * i32::from(values[i][l]));
             let mut sum = products[0];
             for product in &products[1..] {
                 sum += product;
             }
             out[l] = sum as f32;
-        } else {
-            out[l] = f32::from(sum(&each!(|i| factors[i][l] * values[i][l])));
         }
+    } else {
+        let mut sums = [0; LANES];
+        for l in 0..LANES {
+            sums[l] = sum(&each!(|i| factors[i][l] * values[i][l]));
+        }
+        convert(&sums, out);
+    }
+}
+
+/// Whole numbers as real ones: on their own, since a loop of both would be as narrow as the wider type asks.
+#[inline(always)]
+fn convert(whole: &Row, real: &mut [f32; LANES]) {
+    for l in 0..LANES {
+        real[l] = f32::from(whole[l]);
     }
 }
 
@@ -192,14 +211,9 @@ fn principal<const WEIGHTED: bool>(
     for c in 0..3 {
         let mut mean = [0; LANES];
         for l in 0..LANES {
-            mean[l] = rounded(16.0 * moments.values[c][l] / moments.weight[l]);
+            mean[l] = rounded(16.0 * moments.values[c][l] * moments.share[l]);
         }
-        let (values, centred) = (texels[c], &mut centred[c]);
-        for l in 0..LANES {
-            let scale = i32::from(scale[l]);
-            let off = each!(|i| ((i32::from(16 * values[i][l] - mean[l]) * scale) >> 16) as i16);
-            each!(|i| centred[i][l] = off[i]);
-        }
+        centre(texels[c], &mean, &scale, &mut centred[c]);
     }
     let [red, green, blue] = &centred;
     let mut covariance = [[0.0; LANES]; 6];
@@ -222,14 +236,33 @@ fn principal<const WEIGHTED: bool>(
         least[l] = least_of(&places);
         most[l] = most_of(&places);
     }
+    let mut unit = [0.0; LANES];
+    for l in 0..LANES {
+        unit[l] = 4096.0 / (AXIS * AXIS) / f32::from(scale[l]);
+    }
     for c in 0..3 {
         for l in 0..LANES {
-            let step = f32::from(axis[c][l]) * 4096.0 / (AXIS * AXIS) / f32::from(scale[l]);
-            let mean = moments.values[c][l] / moments.weight[l];
+            let step = f32::from(axis[c][l]) * unit[l];
+            let mean = moments.values[c][l] * moments.share[l];
             ends[0][c][l] = mean + step * f32::from(most[l]);
             ends[1][c][l] = mean + step * f32::from(least[l]);
         }
     }
+}
+
+/// The values less their mean, scaled; `mean` in sixteenths.
+#[inline(always)]
+fn centre(values: &Plane, mean: &Row, scale: &Row, centred: &mut Plane) {
+    for l in 0..LANES {
+        let off = each!(|i| high_half(16 * values[i][l] - mean[l], scale[l]));
+        each!(|i| centred[i][l] = off[i]);
+    }
+}
+
+/// The upper 16 bits of a product.
+#[inline(always)]
+fn high_half(a: i16, b: i16) -> i16 {
+    ((i32::from(a) * i32::from(b)) >> 16) as i16
 }
 
 /// The length of a principal axis.
@@ -334,6 +367,15 @@ fn refine<const WEIGHTED: bool>(texels: [&Plane; 3], weights: &Plane, moments: &
     }
 }
 
+/// The places of all texels.
+#[inline(always)]
+fn find_places(texels: [&Plane; 3], slopes: &Channels, base: &Row, places: &mut Plane) {
+    for l in 0..LANES {
+        let found = each!(|i| place(texels, i, l, slopes, base));
+        each!(|i| places[i][l] = found[i]);
+    }
+}
+
 #[inline(always)]
 fn add_up<const WEIGHTED: bool>(
     texels: [&Plane; 3],
@@ -343,20 +385,18 @@ fn add_up<const WEIGHTED: bool>(
     sums: &mut Sums,
 ) {
     let mut places = [[0; LANES]; TEXELS];
-    for l in 0..LANES {
-        let found = each!(|i| place(texels, i, l, slopes, base));
-        each!(|i| places[i][l] = found[i]);
-    }
+    find_places(texels, slopes, base, &mut places);
     let mut weighted = places;
     if WEIGHTED {
         products(weights, &places, &mut weighted);
     }
+    let (mut first, mut second) = ([0; LANES], [0; LANES]);
     for l in 0..LANES {
-        sums.places[l] = f32::from(sum(&each!(|i| weighted[i][l])));
+        first[l] = sum(&each!(|i| weighted[i][l]));
+        second[l] = sum(&each!(|i| weighted[i][l] * places[i][l]));
     }
-    for l in 0..LANES {
-        sums.squares[l] = f32::from(sum(&each!(|i| weighted[i][l] * places[i][l])));
-    }
+    convert(&first, &mut sums.places);
+    convert(&second, &mut sums.squares);
     for c in 0..3 {
         weighted_sum::<WEIGHTED>(&weighted, texels[c], &mut sums.products[c]);
     }
@@ -414,7 +454,7 @@ fn least_squares(moments: &Moments, sums: &Sums, ends: &mut [Reals; 2]) {
         let (total, products, from, to) = (&moments.values[c], &sums.products[c], &mut from[c], &mut to[c]);
         for l in 0..LANES {
             let slope = (moments.weight[l] * products[l] - sums.places[l] * total[l]) * inverse[l];
-            let start = (total[l] - slope * sums.places[l]) / moments.weight[l];
+            let start = (total[l] - slope * sums.places[l]) * moments.share[l];
             from[l] = start;
             to[l] = start + 3.0 * slope;
         }

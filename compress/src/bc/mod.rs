@@ -217,7 +217,10 @@ pub fn encode_volume_with(
     extent: Extent3,
     options: EncodeOptions,
 ) -> Result<Vec<u8>, EncodeError> {
-    let bytes = format.encoded_len(extent);
+    let (expected, bytes) = (format.decoded_len(extent), format.encoded_len(extent));
+    if samples.len() != expected {
+        return Err(EncodeError::Length { format, expected, found: samples.len() });
+    }
     let mut blocks = zeroed(bytes).ok_or(EncodeError::OutOfMemory { bytes })?;
     encode_volume_into(format, samples, extent, options, &mut blocks)?;
     Ok(blocks)

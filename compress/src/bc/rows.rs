@@ -137,6 +137,66 @@ impl Batch {
     }
 }
 
+/// A kernel in both kinds of instructions: the same source, inlined into functions of either kind. Each on its own,
+/// since in one large function the compiler leaves calls in the loops.
+macro_rules! kernel {
+    ($(#[$doc:meta])* $name:ident($($argument:ident: $type:ty),*), $wide:ident, $body:expr) => {
+        $(#[$doc])*
+        fn $name($($argument: $type),*, simd: Simd) {
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+            fn $wide($($argument: $type),*) {
+                $body;
+            }
+            match simd {
+                Simd::Plain => $body,
+                #[cfg(target_arch = "x86_64")]
+                Simd::Avx2(_) => {
+                    #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
+                    // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
+                    unsafe {
+                        $wide($($argument),*);
+                    }
+                }
+            }
+        }
+    };
+}
+
+kernel! {
+    /// One channel, by texel.
+    split_scalars(strip: [&[u8; LANES * EDGE]; EDGE], plane: &mut Plane), wide,
+    scalar_plane(strip, plane)
+}
+kernel! {
+    /// Four channels, by texel.
+    split_colours(texels: &Texels, planes: &mut [Plane; 4]), wide, colour_planes(texels, planes)
+}
+kernel! {
+    range_scalars(plane: &Plane, blocks: &mut [Words; LANES]), wide,
+    scalar::encode(plane, Effort::Range, blocks)
+}
+kernel! {
+    fitted_scalars(plane: &Plane, blocks: &mut [Words; LANES]), wide,
+    scalar::encode(plane, Effort::Fitted, blocks)
+}
+kernel! {
+    searched_scalars(plane: &Plane, blocks: &mut [Words; LANES]), wide,
+    scalar::encode(plane, Effort::Searched, blocks)
+}
+kernel! {
+    fast_colours(planes: &[Plane; 4], blocks: &mut [Words; LANES]), wide,
+    colour::encode::<false, false>(planes, blocks)
+}
+kernel! {
+    best_colours(planes: &[Plane; 4], blocks: &mut [Words; LANES]), wide,
+    colour::encode::<true, false>(planes, blocks)
+}
+kernel! {
+    weighted_colours(planes: &[Plane; 4], blocks: &mut [Words; LANES]), wide,
+    colour::encode::<true, true>(planes, blocks)
+}
+
 /// The blocks of a strip of one channel.
 fn scalars(
     strip: [&[u8; LANES * EDGE]; EDGE],
@@ -144,82 +204,41 @@ fn scalars(
     simd: Simd,
     blocks: &mut [Words; LANES],
 ) {
-    match simd {
-        Simd::Plain => scalars_plain(strip, options, blocks),
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(_) => {
-            #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-            // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
-            unsafe {
-                scalars_avx2(strip, options, blocks);
-            }
-        }
+    let mut plane: Plane = [[0; LANES]; TEXELS];
+    split_scalars(strip, &mut plane, simd);
+    match options.level {
+        Level::Fast => range_scalars(&plane, blocks, simd),
+        Level::Best => searched_scalars(&plane, blocks, simd),
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-fn scalars_avx2(strip: [&[u8; LANES * EDGE]; EDGE], options: EncodeOptions, blocks: &mut [Words; LANES]) {
-    scalars_plain(strip, options, blocks);
-}
-
-#[inline(always)]
-fn scalars_plain(strip: [&[u8; LANES * EDGE]; EDGE], options: EncodeOptions, blocks: &mut [Words; LANES]) {
-    let mut plane: Plane = [[0; LANES]; TEXELS];
-    scalar_plane(strip, &mut plane);
-    let effort = match options.level {
-        Level::Fast => Effort::Range,
-        Level::Best => Effort::Searched,
-    };
-    scalar::encode(&plane, effort, blocks);
-}
-
-/// The blocks of a strip of four channels: those of alpha, if it is asked for, and those of colour.
+/// The blocks of texels of four channels: those of alpha, if it is asked for, and those of colour.
 fn colours(
     texels: &Texels,
     with_alpha: bool,
     options: EncodeOptions,
     simd: Simd,
-    blocks: &mut [[Words; LANES]; 2],
-) {
-    match simd {
-        Simd::Plain => colours_plain(texels, with_alpha, options, blocks),
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(_) => {
-            #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-            // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
-            unsafe {
-                colours_avx2(texels, with_alpha, options, blocks);
-            }
-        }
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-fn colours_avx2(texels: &Texels, with_alpha: bool, options: EncodeOptions, blocks: &mut [[Words; LANES]; 2]) {
-    colours_plain(texels, with_alpha, options, blocks);
-}
-
-#[inline(always)]
-fn colours_plain(
-    texels: &Texels,
-    with_alpha: bool,
-    options: EncodeOptions,
     [alphas, colours]: &mut [[Words; LANES]; 2],
 ) {
     let mut planes: [Plane; 4] = [[[0; LANES]; TEXELS]; 4];
-    colour_planes(texels, &mut planes);
-    if with_alpha {
-        let effort = match options.level {
-            Level::Fast => Effort::Range,
-            Level::Best => Effort::Fitted,
-        };
-        scalar::encode(&planes[3], effort, alphas);
-    }
-    if with_alpha && options.colour_weight == ColourWeight::Alpha && options.level == Level::Best {
-        colour::encode::<true>(&planes, options.level, colours);
-    } else {
-        colour::encode::<false>(&planes, options.level, colours);
+    split_colours(texels, &mut planes, simd);
+    let weighted = with_alpha && options.colour_weight == ColourWeight::Alpha;
+    match options.level {
+        Level::Fast => {
+            if with_alpha {
+                range_scalars(&planes[3], alphas, simd);
+            }
+            fast_colours(&planes, colours, simd);
+        }
+        Level::Best => {
+            if with_alpha {
+                fitted_scalars(&planes[3], alphas, simd);
+            }
+            if weighted {
+                weighted_colours(&planes, colours, simd);
+            } else {
+                best_colours(&planes, colours, simd);
+            }
+        }
     }
 }

@@ -21,7 +21,7 @@ pub(super) enum Effort {
 }
 
 /// Rounds of least squares, and of trying neighbours.
-const FITS: usize = 2;
+const FITS: usize = 1;
 const SEARCHES: usize = 3;
 
 /// Steps from one end point to the other in the two kinds of block.
