@@ -2,15 +2,19 @@
 //!
 //! Source: KDFS, "RGTC Compressed Texture Image Formats", section "BC5 unsigned".
 
-use super::bc4;
-use super::block::{Texels, texels};
+use super::block::Texels;
+use super::{EncodeOptions, bc4, rows};
+use crate::simd::Simd;
 
 /// Encodes a row of blocks: `rows` are its four rows of voxels.
-pub(super) fn encode_row(rows: [&[[u8; 2]]; 4], blocks: &mut [u8]) {
-    for (x, block) in blocks.chunks_exact_mut(16).enumerate() {
-        let texels = texels(rows, x);
-        for (channel, half) in block.chunks_exact_mut(8).enumerate() {
-            half.copy_from_slice(&bc4::encode(&texels.map(|texel| [texel[channel]])));
+pub(super) fn encode_row(rows: [&[[u8; 2]]; 4], blocks: &mut [u8], options: EncodeOptions, simd: Simd) {
+    let (halves, _) = blocks.as_chunks_mut::<8>();
+    let mut plane = vec![[0; 8]; halves.len() / 2];
+    for channel in 0..2 {
+        let lines = rows.map(|row| row.iter().map(|voxel| voxel[channel]).collect::<Vec<u8>>());
+        rows::encode_scalars(lines.each_ref().map(Vec::as_slice), &mut plane, options, simd);
+        for (half, block) in halves.iter_mut().skip(channel).step_by(2).zip(&plane) {
+            *half = *block;
         }
     }
 }

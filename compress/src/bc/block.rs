@@ -7,45 +7,31 @@ use crate::Extent3;
 /// Voxels of a block, in x and in y.
 const EDGE: usize = 4;
 
+/// Blocks of one task, about: enough that starting it costs nothing, few enough to share out evenly.
+const TASK_BLOCKS: usize = 2048;
+
 /// The 16 voxels of one block, `[x, y]`, x fastest; `N` bytes a voxel.
 pub(super) type Texels<const N: usize> = [[u8; N]; EDGE * EDGE];
 
-/// Encodes all blocks of a volume, `block_bytes` each. `samples` and `blocks` have the lengths of the extent.
-///
-/// `encode_row` is given four rows of voxels, whole blocks long, and the bytes of their row of blocks.
-pub(super) fn encode<const N: usize>(
-    samples: &[u8],
+/// Encodes all blocks of a volume in tasks of some rows of blocks. `encode_rows` gets the four rows of voxels of each of
+/// them, the last repeated past the far edge in y, and the bytes of all their blocks.
+pub(super) fn encode_tasks<'a, V: Sync>(
+    voxels: &'a [V],
     extent: Extent3,
     blocks: &mut [u8],
     block_bytes: usize,
-    encode_row: impl Fn([&[[u8; N]]; EDGE], &mut [u8]) + Sync,
+    encode_rows: impl Fn(&mut dyn Iterator<Item = [&'a [V]; EDGE]>, &mut [u8]) + Sync,
 ) {
-    let (voxels, _) = samples.as_chunks::<N>();
-    let [blocks_x, blocks_y, _] = extent.blocks();
-    let padded = blocks_x * EDGE;
-    blocks.par_chunks_mut(blocks_x * block_bytes).enumerate().for_each_init(
-        || vec![[0; N]; if padded == extent.x() { 0 } else { EDGE * padded }],
-        |scratch, (row, bytes)| {
-            let (z, y) = (row / blocks_y, row % blocks_y * EDGE);
-            // Past the far edges the last row, and the last voxel, are repeated.
-            let line = |j: usize| {
-                let y = (y + j).min(extent.y() - 1);
-                &voxels[(z * extent.y() + y) * extent.x()..][..extent.x()]
-            };
-            if padded == extent.x() {
-                return encode_row(std::array::from_fn(line), bytes);
-            }
-            for (j, row) in scratch.chunks_exact_mut(padded).enumerate() {
-                let line = line(j);
-                row[..line.len()].copy_from_slice(line);
-                row[line.len()..].fill(line[line.len() - 1]);
-            }
-            encode_row(std::array::from_fn(|j| &scratch[j * padded..][..padded]), bytes);
-        },
-    );
+    let row_bytes = extent.blocks()[0] * block_bytes;
+    let task_rows = (TASK_BLOCKS / extent.blocks()[0]).max(1);
+    blocks.par_chunks_mut(task_rows * row_bytes).enumerate().for_each(|(task, blocks)| {
+        let first = task * task_rows;
+        let mut lines = (first..first + blocks.len() / row_bytes).map(|row| rows(voxels, extent, row));
+        encode_rows(&mut lines, blocks);
+    });
 }
 
-/// Encodes all blocks of a volume by whole rows: each has four rows of voxels.
+/// Encodes all blocks of a volume row by row: each has four rows of voxels, the last repeated past the far edge in y.
 pub(super) fn encode_rows<V: Sync>(
     voxels: &[V],
     extent: Extent3,
@@ -54,8 +40,10 @@ pub(super) fn encode_rows<V: Sync>(
     encode_row: impl Fn([&[V]; EDGE], &mut [u8]) + Sync,
 ) {
     let row_bytes = extent.blocks()[0] * block_bytes;
-    blocks.par_chunks_mut(row_bytes).enumerate().for_each(|(row, blocks)| {
-        encode_row(rows(voxels, extent, row), blocks);
+    encode_tasks(voxels, extent, blocks, block_bytes, |rows, blocks| {
+        for (rows, blocks) in rows.zip(blocks.chunks_mut(row_bytes)) {
+            encode_row(rows, blocks);
+        }
     });
 }
 
@@ -130,11 +118,9 @@ mod tests {
     use super::*;
 
     /// A "codec" that keeps the 16 bytes of a block, to see the order of blocks and voxels alone.
-    fn keep(rows: [&[[u8; 1]]; EDGE], blocks: &mut [u8]) {
+    fn keep(rows: [&[u8]; EDGE], blocks: &mut [u8]) {
         for (x, block) in blocks.chunks_exact_mut(EDGE * EDGE).enumerate() {
-            for (row, line) in rows.iter().zip(block.chunks_exact_mut(EDGE)) {
-                line.copy_from_slice(row[x * EDGE..][..EDGE].as_flattened());
-            }
+            block.copy_from_slice(&texels(rows, x));
         }
     }
 
@@ -143,7 +129,7 @@ mod tests {
         let extent = Extent3::new([5, 6, 5]).unwrap();
         let samples: Vec<u8> = (0..150).collect();
         let mut blocks = vec![0; extent.block_count() * 16];
-        encode(&samples, extent, &mut blocks, 16, keep);
+        encode_rows(&samples, extent, &mut blocks, 16, keep);
         for z in 0..5 {
             for block_y in 0..2 {
                 for block_x in 0..2 {
@@ -166,7 +152,7 @@ mod tests {
             let extent = Extent3::new(sizes).unwrap();
             let samples: Vec<u8> = (0..extent.voxels()).map(|i| (i * 7 + i / 251) as u8).collect();
             let mut blocks = vec![0; extent.block_count() * 16];
-            encode(&samples, extent, &mut blocks, 16, keep);
+            encode_rows(&samples, extent, &mut blocks, 16, keep);
             let mut back = vec![0; samples.len()];
             decode(&blocks, extent, &mut back, |block: [u8; 16]| block.map(|byte| [byte]));
             assert_eq!(back, samples, "{sizes:?}");

@@ -19,6 +19,7 @@
 //! Source: KDFS, chapters "S3TC Compressed Texture Image Formats", "RGTC Compressed Texture Image Formats" and "BPTC
 //! Compressed Texture Image Formats".
 
+mod batch;
 mod bc1;
 mod bc3;
 mod bc4;
@@ -26,13 +27,17 @@ mod bc5;
 mod bc7;
 mod block;
 pub mod choose;
+mod colour;
 mod endpoints;
 mod lanes;
+mod rows;
+mod scalar;
 pub mod two_plane;
 
 use thiserror::Error;
 
 use crate::Extent3;
+use crate::simd::Simd;
 
 /// A block format. The set is closed: its members stand in files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -217,32 +222,44 @@ pub fn encode_volume_with(
     }
     let bytes = format.encoded_len(extent);
     let mut blocks = zeroed(bytes).ok_or(EncodeError::OutOfMemory { bytes })?;
+    encode_into(format, samples, extent, options, &mut blocks, Simd::best());
+    Ok(blocks)
+}
+
+fn encode_into(
+    format: BlockFormat,
+    samples: &[u8],
+    extent: Extent3,
+    options: EncodeOptions,
+    blocks: &mut [u8],
+    simd: Simd,
+) {
+    let bytes = format.block_bytes();
     match format {
-        BlockFormat::Bc1 => {
-            block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
-                bc1::encode_row(rows, blocks, options);
+        BlockFormat::Bc1 | BlockFormat::Bc3 => {
+            let across = extent.blocks()[0];
+            block::encode_tasks(samples.as_chunks().0, extent, blocks, bytes, |lines, blocks| {
+                if format == BlockFormat::Bc1 {
+                    rows::encode_colours::<8>(lines, across, blocks.as_chunks_mut().0, options, simd);
+                } else {
+                    rows::encode_colours::<16>(lines, across, blocks.as_chunks_mut().0, options, simd);
+                }
             });
         }
-        BlockFormat::Bc3 => {
-            block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
-                bc3::encode_row(rows, blocks, options);
-            });
-        }
-        BlockFormat::Bc4 => {
-            block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
-                bc4::encode_row(rows.map(<[[u8; 1]]>::as_flattened), blocks, options);
-            });
-        }
+        BlockFormat::Bc4 => block::encode_rows(samples, extent, blocks, bytes, |rows, blocks| {
+            encode_scalars(rows, blocks, options, simd);
+        }),
         BlockFormat::Bc5 => {
-            block::encode(samples, extent, &mut blocks, format.block_bytes(), bc5::encode_row);
+            block::encode_rows(samples.as_chunks().0, extent, blocks, bytes, |rows, blocks| {
+                bc5::encode_row(rows, blocks, options, simd);
+            });
         }
         BlockFormat::Bc7 => {
-            block::encode(samples, extent, &mut blocks, format.block_bytes(), |rows, blocks| {
+            block::encode_rows(samples.as_chunks().0, extent, blocks, bytes, |rows, blocks| {
                 bc7::encode_row(rows, blocks, options);
             });
         }
     }
-    Ok(blocks)
 }
 
 /// Decodes a volume: the inverse of [`encode_volume`], for blocks of any encoder.
@@ -277,17 +294,25 @@ pub(crate) fn encode_colours(
     rows: [&[[u8; 4]]; 4],
     blocks: &mut [u8],
     options: EncodeOptions,
+    simd: Simd,
 ) {
+    let across = blocks.len() / format.block_bytes();
+    let one = std::iter::once(rows);
     match format {
-        BlockFormat::Bc3 => bc3::encode_row(rows, blocks, options),
+        BlockFormat::Bc3 => rows::encode_colours::<16>(one, across, blocks.as_chunks_mut().0, options, simd),
         BlockFormat::Bc7 => bc7::encode_row(rows, blocks, options),
-        _ => bc1::encode_row(rows, blocks, options),
+        _ => rows::encode_colours::<8>(one, across, blocks.as_chunks_mut().0, options, simd),
     }
 }
 
 /// Encodes a row of blocks of scalars, BC4: `rows` are four rows of 4·n voxels.
-pub(crate) fn encode_scalars(rows: [&[u8]; 4], blocks: &mut [u8], options: EncodeOptions) {
-    bc4::encode_row(rows, blocks, options);
+pub(crate) fn encode_scalars(rows: [&[u8]; 4], blocks: &mut [u8], options: EncodeOptions, simd: Simd) {
+    rows::encode_scalars(rows, blocks.as_chunks_mut().0, options, simd);
+}
+
+/// The block of BC3 of one colour; its last 8 bytes are BC1.
+pub(crate) fn constant(texel: [u8; 4]) -> [u8; 16] {
+    rows::constant(texel)
 }
 
 /// The block of BC7 of one colour, exactly.

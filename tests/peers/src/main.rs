@@ -1,6 +1,6 @@
-//! Other people's codecs beside ours, interleaved in one process, one thread: `peers <what> ...` prints a line of JSON a
-//! codec and rate.
+//! Other people's codecs beside ours, interleaved in one process: `peers WHAT ...` prints a line of JSON for each codec.
 
+mod blocks;
 mod series;
 mod zfp;
 
@@ -10,7 +10,8 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let result = match arguments.split_first() {
         Some((what, rest)) if what == "series" => series::run(rest),
-        _ => Err("usage: peers series FILE X Y Z STEPS".into()),
+        Some((what, rest)) if what == "blocks" => blocks::run(rest),
+        _ => Err(format!("usage: peers series FILE X Y Z STEPS, or peers {}", blocks::USAGE).into()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
