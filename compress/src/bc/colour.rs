@@ -1,9 +1,6 @@
 //! The kernel of BC1, and of colour in BC3: a batch of blocks at a time, see `batch`.
-#![expect(
-    clippy::manual_clamp,
-    clippy::needless_range_loop,
-    reason = "loops over lanes and masks that vectorise: an iterator over one of the planes, or clamp, does not"
-)]
+
+#![expect(clippy::needless_range_loop, reason = "loops over lanes, the same in all arrays, must vectorise")]
 
 use super::batch::{
     LANES, Plane, ROUND, Row, Words, choose, each, interleave, least_of, most_of, rounded, rounded_signed,
@@ -94,12 +91,16 @@ pub(super) fn encode<const BEST: bool, const WEIGHTED: bool>(
         quantise(&reals, &mut ends);
     }
     pack(texels, &ends, blocks);
+    let mut single = 0_u32;
     for l in 0..LANES {
-        if ends.packed[0][l] == ends.packed[1][l] {
-            let mean = |c: usize| (moments.values[c][l] * moments.share[l] + 0.5) as u8;
-            let block = u64::from_le_bytes(bc1::solid([mean(0), mean(1), mean(2)]));
-            blocks[l] = [block as u16, (block >> 16) as u16, (block >> 32) as u16, (block >> 48) as u16];
-        }
+        single |= u32::from(ends.packed[0][l] == ends.packed[1][l]) << l;
+    }
+    while single != 0 {
+        let l = single.trailing_zeros() as usize;
+        single &= single - 1;
+        let mean = |c: usize| (moments.values[c][l] * moments.share[l] + 0.5) as u8;
+        let block = u64::from_le_bytes(bc1::solid([mean(0), mean(1), mean(2)]));
+        blocks[l] = [block as u16, (block >> 16) as u16, (block >> 32) as u16, (block >> 48) as u16];
     }
 }
 
@@ -350,7 +351,7 @@ fn place(texels: [&Plane; 3], i: usize, l: usize, slopes: &Channels, base: &Row)
     let g = slopes[1][l].wrapping_mul(texels[1][i][l]);
     let b = slopes[2][l].wrapping_mul(texels[2][i][l]);
     let place = base[l].wrapping_sub(r).wrapping_sub(g).wrapping_sub(b) >> PLACE_BITS;
-    place.max(0).min(3)
+    place.clamp(0, 3)
 }
 
 /// Moves the ends to the least squares of the places found, and again; keeps what has the least error.

@@ -346,3 +346,82 @@ pub(crate) fn zeroed(len: usize) -> Option<Vec<u8>> {
     drop(std::hint::black_box(asked));
     Some(vec![0; len])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Blocks of noise, of noise in a narrow range, of ramps, of two values, and of one; with the ends of the range.
+    fn samples(extent: Extent3, channels: usize) -> Vec<u8> {
+        let mut state = 1_u32;
+        let mut noise = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            state >> 24
+        };
+        let mut samples = Vec::new();
+        for i in 0..extent.voxels() {
+            let (x, y) = (i % extent.x(), i / extent.x());
+            for channel in 0..channels {
+                let (width, base) = ((y / 4 * 7 % 9) as u32, (x / 4 * 37 + channel * 50) as u32 % 256);
+                let value = match x / 4 % 5 {
+                    0 => noise(),
+                    1 => base + (noise() >> width),
+                    2 => base + (x % 4 * 9 + y % 4 * 17 * (channel + 1)) as u32,
+                    3 => {
+                        if noise() > 99 {
+                            255
+                        } else {
+                            0
+                        }
+                    }
+                    _ => base,
+                };
+                samples.push(value.min(255) as u8);
+            }
+        }
+        samples
+    }
+
+    #[test]
+    fn the_bytes_are_the_same_with_and_without_wide_instructions_and_for_any_number_of_threads() {
+        // 410·60·16/16 blocks and more; the width is of no whole batch and of no whole block.
+        let extent = Extent3::new([1638, 239, 5]).unwrap();
+        for format in [BlockFormat::Bc1, BlockFormat::Bc3, BlockFormat::Bc4] {
+            let samples = samples(extent, format.channels());
+            for level in [Level::Fast, Level::Best] {
+                for weight in [ColourWeight::Alpha, ColourWeight::Equal] {
+                    let options = EncodeOptions { colour_weight: weight, level };
+                    let blocks = |simd: Simd, threads: usize| {
+                        let mut blocks = vec![0; format.encoded_len(extent)];
+                        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                        pool.install(|| encode_into(format, &samples, extent, options, &mut blocks, simd));
+                        blocks
+                    };
+                    let plain = blocks(Simd::Plain, 1);
+                    for (simd, threads) in [(Simd::best(), 1), (Simd::best(), 4)] {
+                        assert!(blocks(simd, threads) == plain, "{format:?} {options:?} {simd:?} {threads}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_row_alone_gives_the_blocks_that_it_has_in_the_volume() {
+        let extent = Extent3::new([70, 4, 1]).unwrap();
+        for format in [BlockFormat::Bc1, BlockFormat::Bc3, BlockFormat::Bc7] {
+            let samples = samples(extent, 4);
+            let volume = encode_volume(format, &samples, extent).unwrap();
+            let mut row = vec![0; volume.len()];
+            let lines: Vec<&[[u8; 4]]> = samples.as_chunks::<4>().0.chunks(70).collect();
+            encode_colours(
+                format,
+                lines.try_into().unwrap(),
+                &mut row,
+                EncodeOptions::default(),
+                Simd::best(),
+            );
+            assert!(row == volume, "{format:?}");
+        }
+    }
+}

@@ -7,6 +7,9 @@ use super::scalar::{self, Effort};
 use super::{ColourWeight, EncodeOptions, Level, bc1, colour};
 use crate::simd::Simd;
 
+/// Blocks that are looked at before any is encoded: the memory that they lie in is fetched meanwhile.
+const LOOK_AHEAD: usize = 64;
+
 /// Encodes one row of blocks of BC4: `rows` are its four rows of voxels, of one length each, `out` a block for each
 /// four voxels begun. Past the end of a row its last voxel is repeated.
 pub(super) fn encode_scalars(rows: [&[u8]; EDGE], out: &mut [[u8; 8]], options: EncodeOptions, simd: Simd) {
@@ -41,13 +44,32 @@ pub(super) fn encode_colours<'a, const BYTES: usize>(
     let mut batch = Batch::new();
     let mut writer = Writer { out, options, simd, last: ([0; 4], constant([0; 4])) };
     for (begin, rows) in (0..writer.out.len()).step_by(across.max(1)).zip(rows) {
-        let [a, b, c, d] = rows.map(|row| row.as_flattened().as_chunks().0);
-        for (i, (((a, b), c), d)) in a.iter().zip(b).zip(c).zip(d).enumerate() {
-            batch.add([a, b, c, d], begin + i, &mut writer);
+        let fours = rows.map(|row| row.as_flattened().as_chunks().0);
+        let whole = fours[0].len();
+        for first in (0..whole).step_by(LOOK_AHEAD) {
+            let [a, b, c, d] = fours.map(|fours| &fours[first..whole.min(first + LOOK_AHEAD)]);
+            let mut varied = 0_u64;
+            for (i, (((a, b), c), d)) in a.iter().zip(b).zip(c).zip(d).enumerate() {
+                varied |= u64::from(!is_one_colour([a, b, c, d])) << i;
+            }
+            for (i, four) in a.iter().enumerate() {
+                if varied >> i & 1 == 0 {
+                    writer.write(four, begin + first + i);
+                }
+            }
+            while varied != 0 {
+                let i = varied.trailing_zeros() as usize;
+                batch.add([&a[i], &b[i], &c[i], &d[i]], begin + first + i, &mut writer);
+                varied &= varied - 1;
+            }
         }
-        if a.len() < across {
+        if whole < across {
             let [a, b, c, d] = rows.map(padded);
-            batch.add([&a, &b, &c, &d], begin + across - 1, &mut writer);
+            if is_one_colour([&a, &b, &c, &d]) {
+                writer.write(&a, begin + whole);
+            } else {
+                batch.add([&a, &b, &c, &d], begin + whole, &mut writer);
+            }
         }
     }
     batch.flush(&mut writer);
@@ -92,6 +114,24 @@ struct Writer<'a, const BYTES: usize> {
     last: ([u8; 4], [u8; BYTES]),
 }
 
+impl<const BYTES: usize> Writer<'_, BYTES> {
+    /// Writes the block of the colour that all four texels are.
+    fn write(&mut self, [red, green, blue, alpha, ..]: &Four, at: usize) {
+        let texel = [*red, *green, *blue, *alpha];
+        if texel != self.last.0 {
+            self.last = (texel, constant(texel));
+        }
+        self.out[at] = self.last.1;
+    }
+}
+
+/// Whether all 16 texels of a block are one.
+#[inline(always)]
+fn is_one_colour(rows: [&Four; EDGE]) -> bool {
+    let [a, b, c, d] = rows.map(|row| u128::from_le_bytes(*row));
+    (a ^ b) | (a ^ c) | (a ^ d) | (a ^ a.rotate_left(32)) == 0
+}
+
 /// Blocks of colours that wait for the kernels.
 struct Batch {
     texels: Texels,
@@ -106,19 +146,9 @@ impl Batch {
         Self { texels: [[[0; 4]; LANES]; TEXELS], planes: [[[0; LANES]; TEXELS]; 4], at: [0; LANES], len: 0 }
     }
 
-    /// Adds a block that goes to place `at`, and encodes what waits if that is enough. A block of one colour is
-    /// written at once.
+    /// Adds a block that goes to place `at`, and encodes what waits if that is enough.
     #[inline(always)]
     fn add<const BYTES: usize>(&mut self, rows: [&Four; EDGE], at: usize, writer: &mut Writer<'_, BYTES>) {
-        let [a, b, c, d] = rows.map(|row| u128::from_le_bytes(*row));
-        if (a ^ b) | (a ^ c) | (a ^ d) | (a ^ a.rotate_left(32)) == 0 {
-            let texel = (a as u32).to_le_bytes();
-            if texel != writer.last.0 {
-                writer.last = (texel, constant(texel));
-            }
-            writer.out[at] = writer.last.1;
-            return;
-        }
         // Always so: it spares the checks of 16 indices.
         let lane = self.len % LANES;
         for (texels, row) in self.texels.as_chunks_mut::<EDGE>().0.iter_mut().zip(rows) {

@@ -5,10 +5,6 @@
 //! neighbours of both end points, since least squares know nothing of rounding, which in a narrow range matters as much.
 //! What has the least error of all tried is kept, measured against the values that the decoder gives. A block whose
 //! values span at most 7 is kept exactly at every effort.
-#![expect(
-    clippy::manual_clamp,
-    reason = "loops over lanes and masks that vectorise: an iterator over one of the planes, or clamp, does not"
-)]
 
 use super::batch::{LANES, Plane, Row, Words, choose, each, interleave, least_of, most_of, rounded, sum};
 use super::endpoints::TEXELS;
@@ -61,9 +57,11 @@ pub(super) fn encode(plane: &Plane, effort: Effort, blocks: &mut [Words; LANES])
         widen(&mut low, &mut high, SEVENTHS);
         pack_sevenths(plane, [&low, &high], &mut words);
     } else {
-        let mut touching = 0;
+        // A block takes the second kind only where it touches an end itself, not where one beside it does.
+        let (mut touches, mut touching) = ([0; LANES], 0);
         for l in 0..LANES {
-            touching |= if low[l] == 0 || high[l] == 255 { varied[l] } else { 0 };
+            touches[l] = if low[l] == 0 || high[l] == 255 { varied[l] } else { 0 };
+            touching |= touches[l];
         }
         widen(&mut low, &mut high, SEVENTHS);
         let sevenths = refined::<SEVENTHS>(plane, low, high, effort);
@@ -76,7 +74,7 @@ pub(super) fn encode(plane: &Plane, effort: Effort, blocks: &mut [Words; LANES])
             pack_fifths(plane, &fifths, &mut others);
             for (word, other) in words.iter_mut().zip(&others) {
                 for l in 0..LANES {
-                    let better = if fifths.error[l] < sevenths.error[l] { u16::MAX } else { 0 };
+                    let better = if fifths.error[l] < sevenths.error[l] { touches[l] as u16 } else { 0 };
                     word[l] ^= (word[l] ^ other[l]) & better;
                 }
             }
@@ -84,7 +82,7 @@ pub(super) fn encode(plane: &Plane, effort: Effort, blocks: &mut [Words; LANES])
     }
     for l in 0..LANES {
         let varied = varied[l] as u16;
-        words[0][l] = words[0][l] & varied | (plane[0][l] as u16 * 0x101) & !varied;
+        words[0][l] = (words[0][l] & varied) | ((plane[0][l] as u16 * 0x101) & !varied);
         words[1][l] &= varied;
         words[2][l] &= varied;
         words[3][l] &= varied;
@@ -130,7 +128,7 @@ fn refined<const STEPS: i16>(plane: &Plane, low: Row, high: Row, effort: Effort)
                 let (down, up) = (number / 3 - 1, number % 3 - 1);
                 let mut ends = (low, high);
                 for l in 0..LANES {
-                    ends.0[l] = (low[l] + down).max(0).min(254);
+                    ends.0[l] = (low[l] + down).clamp(0, 254);
                     ends.1[l] = (high[l] + up).min(255).max(ends.0[l] + 1);
                 }
                 try_ends::<STEPS>(plane, &ends.0, &ends.1, &mut best);

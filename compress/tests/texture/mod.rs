@@ -166,34 +166,40 @@ fn nothing_that_only_saves_time_changes_a_byte() {
 
 #[test]
 fn a_patch_after_a_change_is_what_the_whole_would_have_there() {
-    let (mut samples, table) = (hounsfield(), table());
-    let before = {
-        let volume = Volume::new(Samples::I16(&samples), extent(SIZES)).unwrap();
-        let source = Source::new(volume, Mapping::Colours(&table)).unwrap();
-        source.blocks(BlockFormat::Bc3, options(Level::Fast)).unwrap().0
-    };
+    let (before, table) = (hounsfield(), table());
+    let mut after = before.clone();
     // Painted: from [30, 41, 2] to before [61, 45, 5], which is to the far edge.
     for z in 2..5 {
         for y in 41..45 {
-            samples[(z * 45 + y) * 61 + 30..(z * 45 + y) * 61 + 61].fill(700);
+            after[(z * 45 + y) * 61 + 30..(z * 45 + y) * 61 + 61].fill(700);
         }
     }
-    let volume = Volume::new(Samples::I16(&samples), extent(SIZES)).unwrap();
-    let source = Source::new(volume, Mapping::Colours(&table)).unwrap();
-    let (whole, _) = source.blocks(BlockFormat::Bc3, options(Level::Fast)).unwrap();
-    let touched = [30, 41, 2]..[61, 45, 5];
-    let patch = source.blocks_of(BlockFormat::Bc3, options(Level::Fast), touched).unwrap();
-    assert_eq!((patch.low, patch.size), ([28, 40, 2], [36, 8, 3]), "whole blocks");
-    let mut patched = before;
-    let row = patch.size[0] as usize * 4;
-    for (i, line) in patch.blocks.chunks_exact(row).enumerate() {
-        let (y, z) = (i % 2 + 10, i / 2 + 2);
-        let at = ((z * 12 + y) * 16 + 7) * 16;
-        patched[at..at + row].copy_from_slice(line);
+    let window = Window::new([-1000.0, 2000.0], SampleKind::I16, 0.0).unwrap();
+    let [colours, scalars] = [Mapping::Colours(&table), Mapping::Scalars(&window)];
+    let source = |samples, mapping| {
+        Source::new(Volume::new(Samples::I16(samples), extent(SIZES)).unwrap(), mapping).unwrap()
+    };
+    for (format, mapping) in
+        [(BlockFormat::Bc3, colours), (BlockFormat::Bc7, colours), (BlockFormat::Bc4, scalars)]
+    {
+        for level in [Level::Fast, Level::Best] {
+            let (mut patched, _) = source(&before, mapping).blocks(format, options(level)).unwrap();
+            let source = source(&after, mapping);
+            let (whole, _) = source.blocks(format, options(level)).unwrap();
+            let patch = source.blocks_of(format, options(level), [30, 41, 2]..[61, 45, 5]).unwrap();
+            assert_eq!((patch.low, patch.size), ([28, 40, 2], [36, 8, 3]), "whole blocks");
+            let bytes = format.block_bytes();
+            let row = patch.size[0] as usize / 4 * bytes;
+            for (i, line) in patch.blocks.chunks_exact(row).enumerate() {
+                let (y, z) = (i % 2 + 10, i / 2 + 2);
+                let at = ((z * 12 + y) * 16 + 7) * bytes;
+                patched[at..at + row].copy_from_slice(line);
+            }
+            assert!(patched == whole, "patched blocks of {format:?} at {level:?}");
+            let far = source.blocks_of(format, options(level), [61, 0, 0]..[70, 4, 4]);
+            assert!(matches!(far, Err(TextureError::Outside { .. })), "outside: {far:?}");
+        }
     }
-    assert!(patched == whole, "patched blocks");
-    let far = source.blocks_of(BlockFormat::Bc3, options(Level::Fast), [61, 0, 0]..[70, 4, 4]);
-    assert!(matches!(far, Err(TextureError::Outside { .. })), "outside: {far:?}");
 }
 
 #[test]
