@@ -165,6 +165,16 @@ pub enum EncodeError {
         /// Bytes given.
         found: usize,
     },
+    /// The place for the blocks is not that of the extent.
+    #[error("there is room for {found} bytes of blocks, but {} of this extent has {expected}", .format.name())]
+    Place {
+        /// The format.
+        format: BlockFormat,
+        /// Bytes that the extent needs.
+        expected: usize,
+        /// Bytes given to encode into.
+        found: usize,
+    },
     /// There is no memory for the blocks.
     #[error("no memory for {bytes} bytes of blocks: close other volumes or encode a part")]
     OutOfMemory {
@@ -216,14 +226,36 @@ pub fn encode_volume_with(
     extent: Extent3,
     options: EncodeOptions,
 ) -> Result<Vec<u8>, EncodeError> {
+    let (expected, bytes) = (format.decoded_len(extent), format.encoded_len(extent));
+    if samples.len() != expected {
+        return Err(EncodeError::Length { format, expected, found: samples.len() });
+    }
+    let mut blocks = zeroed(bytes).ok_or(EncodeError::OutOfMemory { bytes })?;
+    encode_volume_into(format, samples, extent, options, &mut blocks)?;
+    Ok(blocks)
+}
+
+/// Encodes a volume over the blocks of an old one, see [`encode_volume`].
+///
+/// # Errors
+/// [`EncodeError::Length`] as there; [`EncodeError::Place`] if `blocks` has not [`BlockFormat::encoded_len`] bytes.
+pub fn encode_volume_into(
+    format: BlockFormat,
+    samples: &[u8],
+    extent: Extent3,
+    options: EncodeOptions,
+    blocks: &mut [u8],
+) -> Result<(), EncodeError> {
     let expected = format.decoded_len(extent);
     if samples.len() != expected {
         return Err(EncodeError::Length { format, expected, found: samples.len() });
     }
-    let bytes = format.encoded_len(extent);
-    let mut blocks = zeroed(bytes).ok_or(EncodeError::OutOfMemory { bytes })?;
-    encode_into(format, samples, extent, options, &mut blocks, Simd::best());
-    Ok(blocks)
+    let expected = format.encoded_len(extent);
+    if blocks.len() != expected {
+        return Err(EncodeError::Place { format, expected, found: blocks.len() });
+    }
+    encode_into(format, samples, extent, options, blocks, Simd::best());
+    Ok(())
 }
 
 fn encode_into(
@@ -404,6 +436,15 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_place_of_another_size_is_refused() {
+        let extent = Extent3::new([4, 4, 1]).unwrap();
+        let refused =
+            encode_volume_into(BlockFormat::Bc4, &[0; 16], extent, EncodeOptions::default(), &mut [0; 9]);
+        let place = EncodeError::Place { format: BlockFormat::Bc4, expected: 8, found: 9 };
+        assert_eq!(refused, Err(place), "a byte too many");
     }
 
     #[test]
