@@ -13,7 +13,6 @@ mod tests;
 use std::path::Path;
 use std::sync::Arc;
 
-use compress::container::StepCodec;
 pub use compress::stream::{Direction, Repeat};
 use render::volume::{Grid, PackedStep, Series};
 
@@ -69,14 +68,6 @@ impl Steps {
         match &self.source {
             Source::Memory(_) => None,
             Source::File(file) => Some((&file.header().name, &file.header().kind)),
-        }
-    }
-
-    /// The codec of a file's steps; none in memory.
-    pub fn codec(&self) -> Option<StepCodec> {
-        match &self.source {
-            Source::Memory(_) => None,
-            Source::File(file) => Some(file.header().codec),
         }
     }
 

@@ -31,10 +31,6 @@ pub const KEY_WORLD_FROM_VOXEL: &str = "osteotome.worldFromVoxel";
 /// Key of the values that the stored 0 and 1 stand for (HU in a CT): two numbers, as text with a space between.
 pub const KEY_RANGE: &str = "osteotome.range";
 
-/// Key of what the two planes of a BC5 texture stand for: offset, coarse and residual of
-/// [`Scales`](crate::bc::two_plane::Scales), three numbers as text with spaces between.
-pub const KEY_PLANES: &str = "osteotome.planes";
-
 /// Key of the program that wrote the file: text. The standard's own.
 pub const KEY_WRITER: &str = "KTXwriter";
 

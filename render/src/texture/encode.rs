@@ -35,7 +35,7 @@ pub(crate) fn encode(plan: &Plan) -> Result<Texels, GpuError> {
     let span = high - low;
     let ms = || begin.elapsed().as_secs_f64() * 1e3;
     if plan.key.format == TextureFormat::R32f {
-        let bytes = floats(plan);
+        let bytes = values(plan).into_iter().flat_map(f32::to_le_bytes).collect();
         let rounding = low.abs().max(high.abs()) * f64::from(f32::EPSILON) / 2.0;
         let max_error = if exact_in_f32(grid) { 0.0 } else { rounding };
         // The mean square of a uniform error of at most `e` is e²/3.
@@ -126,15 +126,8 @@ pub(crate) fn encode(plan: &Plan) -> Result<Texels, GpuError> {
 
 /// A scalar in two planes: the sum of red and green, weighted, is the value, also between texels.
 fn two_planes(plan: &Plan, begin: std::time::Instant) -> Result<Texels, GpuError> {
-    let [nx, ny, nz] = plan.texels();
-    let mut values = vec![0.0_f32; nx * ny * nz];
-    values.par_chunks_mut(nx).enumerate().for_each(|(row, out)| {
-        for (x, value) in out.iter_mut().enumerate() {
-            *value = mean(plan, [x, row % ny, row / ny]) as f32;
-        }
-    });
     let extent = Extent3::new(plan.texels().map(|n| n as u32)).map_err(failed)?;
-    let made = encode_two_planes(&values, extent, plan.key.grid.range()).map_err(failed)?;
+    let made = encode_two_planes(&values(plan), extent, plan.key.grid.range()).map_err(failed)?;
     let Scales { offset, coarse, residual } = made.scales;
     let [x, y, z] = extent.sizes();
     Ok(Texels {
@@ -196,15 +189,20 @@ fn exact_in_f32(grid: &Grid) -> bool {
 
 /// A box that is drawn coarser: the mean of the voxels that each texel stands for.
 fn reduced(plan: &Plan) -> Result<Grid, GpuError> {
+    let place = *plan.key.grid.world_from_voxel();
+    Grid::new(plan.texels(), Samples::F32(values(plan)), Rescale::default(), place).map_err(failed)
+}
+
+/// The values of the texels, x fastest, in parallel over rows.
+fn values(plan: &Plan) -> Vec<f32> {
     let [nx, ny, nz] = plan.texels();
-    let mut values = vec![0.0; nx * ny * nz];
+    let mut values = vec![0.0_f32; nx * ny * nz];
     values.par_chunks_mut(nx).enumerate().for_each(|(row, out)| {
         for (x, value) in out.iter_mut().enumerate() {
             *value = mean(plan, [x, row % ny, row / ny]) as f32;
         }
     });
-    let place = *plan.key.grid.world_from_voxel();
-    Grid::new([nx, ny, nz], Samples::F32(values), Rescale::default(), place).map_err(failed)
+    values
 }
 
 /// The value of a texel: the mean of the voxels it stands for.
@@ -222,18 +220,6 @@ fn mean(plan: &Plan, at: [usize; 3]) -> f64 {
         }
     }
     sum / count
-}
-
-/// The values as 32-bit floats, x fastest.
-fn floats(plan: &Plan) -> Vec<u8> {
-    let [nx, ny, nz] = plan.texels();
-    let mut bytes = vec![0_u8; nx * ny * nz * 4];
-    bytes.par_chunks_mut(nx * 4).enumerate().for_each(|(row, out)| {
-        for (x, texel) in out.chunks_exact_mut(4).enumerate() {
-            texel.copy_from_slice(&(mean(plan, [x, row % ny, row / ny]) as f32).to_le_bytes());
-        }
-    });
-    bytes
 }
 
 fn failed(error: impl std::fmt::Display) -> GpuError {

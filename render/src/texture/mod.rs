@@ -165,10 +165,21 @@ fn create(gpu: &Gpu, format: wgpu::TextureFormat, extent: [u32; 3]) -> wgpu::Tex
 
 /// Fills a texture with its texels or blocks, tightly packed, x fastest.
 fn write(gpu: &Gpu, texture: &wgpu::Texture, bytes: &[u8]) {
-    let (format, size) = (texture.format(), texture.size());
+    write_part(gpu, texture, wgpu::Origin3d::ZERO, texture.size(), bytes);
+}
+
+/// Writes the texels or blocks of a box of a texture, whole blocks, tightly packed, x fastest.
+fn write_part(
+    gpu: &Gpu,
+    texture: &wgpu::Texture,
+    origin: wgpu::Origin3d,
+    size: wgpu::Extent3d,
+    bytes: &[u8],
+) {
+    let format = texture.format();
     let block = u32::from(format.is_compressed()) * 3 + 1;
     gpu.queue.write_texture(
-        texture.as_image_copy(),
+        wgpu::TexelCopyTextureInfo { origin, ..texture.as_image_copy() },
         bytes,
         wgpu::TexelCopyBufferLayout {
             offset: 0,
@@ -179,16 +190,16 @@ fn write(gpu: &Gpu, texture: &wgpu::Texture, bytes: &[u8]) {
     );
 }
 
-/// 0 to 1 over the edges of `extent` texels, the first of which is voxel 0.
-fn texture_from_voxel(extent: [f64; 3]) -> Affine {
+/// 0 to 1 over the edges of a texture of `cover` voxels, the first of which is voxel `low`.
+fn texture_from_voxel(cover: [f64; 3], low: [f64; 3]) -> Affine {
     let column = |a: usize| {
         let mut v = Vector::zeros();
-        v[a] = 1.0 / extent[a];
+        v[a] = 1.0 / cover[a];
         v
     };
+    let origin = Point::from([0, 1, 2].map(|a| (0.5 - low[a]) / cover[a]));
     // A diagonal of positive numbers has an inverse.
-    Affine::from_columns(column(0), column(1), column(2), Point::from(extent.map(|n| 0.5 / n)))
-        .unwrap_or_default()
+    Affine::from_columns(column(0), column(1), column(2), origin).unwrap_or_default()
 }
 
 /// Textures kept from frame to frame.
@@ -227,22 +238,11 @@ impl TextureCache {
             if Arc::ptr_eq(&key.grid, old) {
                 key.grid = Arc::clone(new);
                 let Some(patch) = encode::patch(&Plan { key: key.clone() }, old, touched)? else { continue };
-                let (size, origin) = (patch.size, patch.low);
+                let (size, [x, y, z]) = (patch.size, patch.low);
                 if !patch.blocks.is_empty() {
-                    let block = texture.texture.format().block_copy_size(None).unwrap_or(16);
-                    gpu.queue.write_texture(
-                        wgpu::TexelCopyTextureInfo {
-                            origin: wgpu::Origin3d { x: origin[0], y: origin[1], z: origin[2] },
-                            ..texture.texture.as_image_copy()
-                        },
-                        &patch.blocks,
-                        wgpu::TexelCopyBufferLayout {
-                            offset: 0,
-                            bytes_per_row: Some(size[0] / 4 * block),
-                            rows_per_image: Some(size[1] / 4),
-                        },
-                        wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: size[2] },
-                    );
+                    let [width, height, depth_or_array_layers] = size;
+                    let box_size = wgpu::Extent3d { width, height, depth_or_array_layers };
+                    write_part(gpu, &texture.texture, wgpu::Origin3d { x, y, z }, box_size, &patch.blocks);
                 }
                 let blocks = |size: [u32; 3]| size.iter().map(|&n| u64::from(n)).product::<u64>() / 16;
                 let here = if patch.blocks.is_empty() { 0 } else { blocks(size) };

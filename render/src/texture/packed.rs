@@ -226,7 +226,7 @@ impl Form {
             reading: self.reading,
             texture: texture.clone(),
             view: texture.create_view(&wgpu::TextureViewDescriptor::default()),
-            texture_from_voxel: texture_from_voxel(cover),
+            texture_from_voxel: texture_from_voxel(cover, [0.0; 3]),
             value_scale: step.rescale().slope * step.top(),
             value_offset: step.rescale().intercept,
             summary: TextureSummary {

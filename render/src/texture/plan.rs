@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use super::texture_from_voxel;
 use crate::gpu::Caps;
 use crate::scene::TextureFormat;
-use crate::volume::{Affine, Grid, Point, Transfer, Vector};
+use crate::volume::{Affine, Grid, Point, Transfer};
 
 /// What makes two textures the same.
 #[derive(Debug, Clone)]
@@ -90,15 +91,8 @@ impl Plan {
 
     /// 0 to 1 over the edges of a texture of `extent` texels.
     pub(crate) fn texture_from_voxel(&self, extent: [u32; 3]) -> Affine {
-        let scale = |a: usize| 1.0 / (f64::from(extent[a]) * self.key.reduce[a] as f64);
-        let column = |a: usize| {
-            let mut v = Vector::zeros();
-            v[a] = scale(a);
-            v
-        };
-        let origin = Point::from([0, 1, 2].map(|a| (0.5 - self.key.low[a] as f64) * scale(a)));
-        // A diagonal of positive numbers has an inverse.
-        Affine::from_columns(column(0), column(1), column(2), origin).unwrap_or_default()
+        let cover = [0, 1, 2].map(|a| f64::from(extent[a]) * self.key.reduce[a] as f64);
+        texture_from_voxel(cover, self.key.low.map(|n| n as f64))
     }
 }
 

@@ -60,11 +60,6 @@ impl PackedFormat {
             Self::Se => product([columns, rows, z.div_ceil(PACKED), 2 * HEAD_BYTES]),
         }
     }
-
-    /// Whether the bytes stand for the samples exactly.
-    pub fn is_lossless(self) -> bool {
-        matches!(self, Self::R8 | Self::R16)
-    }
 }
 
 impl fmt::Display for PackedFormat {
