@@ -5,6 +5,7 @@
 //! how wide the machine's vectors are.
 
 use super::endpoints::TEXELS;
+use crate::simd::fetch_ahead;
 
 /// Voxels of a block in x, and in y.
 pub(super) const EDGE: usize = 4;
@@ -17,9 +18,6 @@ pub(super) type Row = [i16; LANES];
 
 /// One number for each texel of each block of a batch, by texel.
 pub(super) type Plane = [Row; TEXELS];
-
-/// The texels of a batch, by texel and lane.
-pub(super) type Texels = [[[u8; 4]; LANES]; TEXELS];
 
 /// A block of 8 bytes, as four little-endian numbers.
 pub(super) type Words = [u16; 4];
@@ -114,18 +112,43 @@ pub(super) fn scalar_plane(strip: [&[u8; LANES * EDGE]; EDGE], plane: &mut Plane
     }
 }
 
-/// Four channels of texels that lie by texel and lane, by channel, texel and lane.
+/// Four channels of blocks side by side, each alone in its bytes.
 #[inline(always)]
-pub(super) fn colour_planes(texels: &Texels, [red, green, blue, alpha]: &mut [Plane; 4]) {
-    for i in 0..TEXELS {
-        let (row, red, green) = (&texels[i], &mut red[i], &mut green[i]);
-        let (blue, alpha) = (&mut blue[i], &mut alpha[i]);
-        for l in 0..LANES {
-            let word = u32::from_le_bytes(row[l]);
-            red[l] = (word & 255) as i16;
-            green[l] = (word >> 8 & 255) as i16;
-            blue[l] = (word >> 16 & 255) as i16;
-            alpha[l] = (word >> 24) as i16;
+pub(super) fn colour_rows(rows: &[[[u8; 16]; LANES]; EDGE], channels: &mut [[[u8; LANES * EDGE]; EDGE]; 4]) {
+    let [red, green, blue, alpha] = channels;
+    for j in 0..EDGE {
+        let texels = rows[j].as_flattened().as_chunks::<4>().0;
+        let (red, green, blue, alpha) = (&mut red[j], &mut green[j], &mut blue[j], &mut alpha[j]);
+        for x in 0..LANES * EDGE {
+            [red[x], green[x], blue[x], alpha[x]] = texels[x];
         }
+    }
+}
+
+/// Encodes a row of blocks of one channel strip by strip of `BLOCKS` blocks, which have `VOXELS` voxels in a row; past
+/// the end of a row its last voxel is repeated.
+#[inline(always)]
+pub(super) fn strips<const VOXELS: usize, const BLOCKS: usize>(
+    rows: [&[u8]; EDGE],
+    out: &mut [[u8; 8]],
+    encode: impl Fn([&[u8; VOXELS]; EDGE]) -> [[u8; 8]; BLOCKS],
+) {
+    let mut padded = [[0; VOXELS]; EDGE];
+    for (i, out) in out.chunks_mut(BLOCKS).enumerate() {
+        let rest = rows.map(|row| &row[i * VOXELS..]);
+        // The rows of the next blocks follow these.
+        rest.iter().for_each(|rest| fetch_ahead(rest, EDGE * rows[0].len()));
+        if let ([Some(a), Some(b), Some(c), Some(d)], Some(out)) =
+            (rest.map(|row| row.first_chunk()), out.first_chunk_mut())
+        {
+            *out = encode([a, b, c, d]);
+            continue;
+        }
+        for (padded, row) in padded.iter_mut().zip(rest) {
+            let (whole, beyond) = padded.split_at_mut(row.len().min(VOXELS));
+            whole.copy_from_slice(&row[..whole.len()]);
+            beyond.fill(row.last().copied().unwrap_or_default());
+        }
+        out.copy_from_slice(&encode(padded.each_ref())[..out.len()]);
     }
 }

@@ -76,32 +76,36 @@ fn unpacked(colour: u16) -> Packed {
     [colour >> 11, colour >> 5 & 63, colour & 31]
 }
 
-fn packed([red, green, blue]: Packed) -> u16 {
-    (red << 11 | green << 5 | blue) as u16
-}
-
-fn pack(c0: u16, c1: u16, indices: u32) -> [u8; 8] {
-    (u64::from(c0) | u64::from(c1) << 16 | u64::from(indices) << 32).to_le_bytes()
-}
-
 /// The block nearest to a single colour: index 2 of the best pair of end points in each channel.
-pub(super) fn solid([red, green, blue]: [u8; 3]) -> [u8; 8] {
-    let [red, green, blue] =
-        [SOLID_5[usize::from(red)], SOLID_6[usize::from(green)], SOLID_5[usize::from(blue)]];
-    let end = |i: usize| packed([red[i], green[i], blue[i]].map(u32::from));
-    let (c0, c1) = (end(0), end(1));
-    match c0.cmp(&c1) {
-        Ordering::Greater => pack(c0, c1, 0xAAAA_AAAA),
-        Ordering::Less => pack(c1, c0, 0xFFFF_FFFF),
+pub(super) fn solid([red, green, blue]: [u8; 3]) -> u64 {
+    let ends = SOLID[0][usize::from(red)] | SOLID[1][usize::from(green)] | SOLID[2][usize::from(blue)];
+    let (c0, c1) = (ends & 0xFFFF, ends >> 16);
+    let (ends, indices) = match c0.cmp(&c1) {
+        Ordering::Greater => (ends, 0xAAAA_AAAA),
+        Ordering::Less => (ends.rotate_left(16), 0xFFFF_FFFF),
         // Not the order of four colours: index 3 would be transparent. All four are alike, so 0 does.
-        Ordering::Equal => pack(c0, c1, 0),
-    }
+        Ordering::Equal => (ends, 0),
+    };
+    u64::from(ends) | indices << 32
 }
 
-/// For each value of 8 bits, the pair of 5-bit (6-bit) end points whose mix (2·a + b)/3 is nearest to it.
-static SOLID_5: [[u8; 2]; 256] = solid_table(31);
-static SOLID_6: [[u8; 2]; 256] = solid_table(63);
+/// By channel and value of 8 bits, the pair of 5-bit (6-bit) end points whose mix (2·a + b)/3 is nearest to it, where
+/// they stand in a block.
+static SOLID: [[u32; 256]; 3] = {
+    let mut tables = [[0; 256]; 3];
+    let (fives, sixes) = (solid_table(31), solid_table(63));
+    let mut i = 0;
+    while i < 256 {
+        let ([a, b], [c, d]) = (fives[i], sixes[i]);
+        tables[0][i] = (a as u32 | (b as u32) << 16) << 11;
+        tables[1][i] = (c as u32 | (d as u32) << 16) << 5;
+        tables[2][i] = a as u32 | (b as u32) << 16;
+        i += 1;
+    }
+    tables
+};
 
+/// For each value of 8 bits, the pair of end points of up to `most` whose mix (2·a + b)/3 is nearest to it.
 const fn solid_table(most: u32) -> [[u8; 2]; 256] {
     let mut table = [[0; 2]; 256];
     let mut met = [false; 256];

@@ -3,8 +3,7 @@
 #![expect(clippy::needless_range_loop, reason = "loops over lanes, the same in all arrays, must vectorise")]
 
 use super::batch::{
-    LANES, Plane, ROUND, Row, Words, choose, each, interleave, least_of, most_of, rounded, rounded_signed,
-    sum,
+    LANES, Plane, ROUND, Row, Words, each, interleave, least_of, most_of, rounded, rounded_signed, sum,
 };
 use super::bc1;
 use super::endpoints::TEXELS;
@@ -18,8 +17,8 @@ const UNSEEN_WEIGHT: i16 = 8;
 /// is, any axis between the two serves as well; the least squares that follow mend the rest.
 const POWER_ROUNDS: usize = 4;
 
-/// Rounds of least squares.
-const REFINEMENTS: usize = 1;
+/// Rounds of least squares, where colours count alike and where they count by alpha.
+const REFINEMENTS: [usize; 2] = [1, 2];
 
 /// Half the widest range of a block, in the whole numbers that its principal axis is found in: 16 products fit 16 bits.
 const HALF_RANGE: f32 = 45.0;
@@ -59,17 +58,12 @@ struct Sums {
     products: Reals,
 }
 
-/// The blocks of the first three planes, at [`super::Level::Best`] or fast; the best may be `WEIGHTED` by alpha, the
-/// fourth.
+/// The blocks of the first three planes; `WEIGHTED` by alpha, the fourth.
 #[inline(always)]
-pub(super) fn encode<const BEST: bool, const WEIGHTED: bool>(
-    planes: &[Plane; 4],
-    blocks: &mut [Words; LANES],
-) {
+pub(super) fn encode<const WEIGHTED: bool>(planes: &[Plane; 4], blocks: &mut [Words; LANES]) {
     let [red, green, blue, alpha] = planes;
     let texels = [red, green, blue];
     let (mut low, mut high) = ([[0; LANES]; 3], [[0; LANES]; 3]);
-    range(texels, &mut low, &mut high);
     let mut weights = [[1; LANES]; TEXELS];
     let mut moments =
         Moments { weight: [16.0; LANES], share: [1.0 / 16.0; LANES], values: [[0.0; LANES]; 3] };
@@ -82,13 +76,15 @@ pub(super) fn encode<const BEST: bool, const WEIGHTED: bool>(
     moments_of::<WEIGHTED>(texels, &weights, &mut moments);
     let mut reals = [[[0.0; LANES]; 3]; 2];
     let mut ends = Ends { packed: [[0; LANES]; 2], values: [[[0; LANES]; 3]; 2] };
-    if BEST {
-        principal::<WEIGHTED>(texels, &weights, &low, &high, &moments, &mut reals);
-        quantise(&reals, &mut ends);
-        refine::<WEIGHTED>(texels, &weights, &moments, &mut ends);
+    range(texels, &mut low, &mut high);
+    if WEIGHTED {
+        principal(texels, &weights, &low, &high, &moments, &mut reals);
     } else {
         diagonal(texels, &low, &high, &mut reals);
-        quantise(&reals, &mut ends);
+    }
+    quantise(&reals, &mut ends);
+    for _ in 0..REFINEMENTS[usize::from(WEIGHTED)] {
+        refine::<WEIGHTED>(texels, &weights, &moments, &mut ends);
     }
     pack(texels, &ends, blocks);
     let mut single = 0_u32;
@@ -99,7 +95,7 @@ pub(super) fn encode<const BEST: bool, const WEIGHTED: bool>(
         let l = single.trailing_zeros() as usize;
         single &= single - 1;
         let mean = |c: usize| (moments.values[c][l] * moments.share[l] + 0.5) as u8;
-        let block = u64::from_le_bytes(bc1::solid([mean(0), mean(1), mean(2)]));
+        let block = bc1::solid([mean(0), mean(1), mean(2)]);
         blocks[l] = [block as u16, (block >> 16) as u16, (block >> 32) as u16, (block >> 48) as u16];
     }
 }
@@ -171,20 +167,22 @@ fn diagonal(texels: [&Plane; 3], low: &Channels, high: &Channels, ends: &mut [Re
     for l in 0..LANES {
         let [r0, g0, b0] = [middle(0, l), middle(1, l), middle(2, l)];
         let off = each!(|i| [(red[i][l] - r0) >> 1, (green[i][l] - g0) >> 1, (blue[i][l] - b0) >> 1]);
-        signs[0][l] = sum(&each!(|i| (off[i][0] * off[i][1]) >> 2));
-        signs[1][l] = sum(&each!(|i| (off[i][1] * off[i][2]) >> 2));
-        signs[2][l] = sum(&each!(|i| (off[i][0] * off[i][2]) >> 2));
+        let sum = |a: usize, b: usize| sum(&each!(|i| (off[i][a] * off[i][b]) >> 2));
+        signs[0][l] = sum(0, 1);
+        signs[1][l] = sum(1, 2);
+        signs[2][l] = sum(0, 2);
     }
-    // Which channel falls where the others rise, all ones if it does: green decides, but where its range is less than
-    // half of another's.
+    // Which channels fall where that of the widest range rises, all ones if they do.
     let mut falls = [[0_i16; LANES]; 3];
     for l in 0..LANES {
         let (red, green, blue) = (high[0][l] - low[0][l], high[1][l] - low[1][l], high[2][l] - low[2][l]);
-        let other_leads = if 2 * green < red.max(blue) { -1 } else { 0 };
+        let green_leads = if green >= red.max(blue) { -1 } else { 0 };
+        let red_leads = if red >= blue { !green_leads } else { 0 };
+        let blue_leads = !green_leads & !red_leads;
         let (red_green, green_blue, red_blue) = (signs[0][l] >> 15, signs[1][l] >> 15, signs[2][l] >> 15);
-        falls[0][l] = red_green & !other_leads;
-        falls[1][l] = red_green & other_leads;
-        falls[2][l] = green_blue & !other_leads | red_blue & other_leads;
+        falls[0][l] = red_green & green_leads | red_blue & blue_leads;
+        falls[1][l] = red_green & red_leads | green_blue & blue_leads;
+        falls[2][l] = green_blue & green_leads | red_blue & red_leads;
     }
     for c in 0..3 {
         for l in 0..LANES {
@@ -200,7 +198,7 @@ fn diagonal(texels: [&Plane; 3], low: &Channels, high: &Channels, ends: &mut [Re
 
 /// The ends of the stretch of the principal axis that the colours fill.
 #[inline(always)]
-fn principal<const WEIGHTED: bool>(
+fn principal(
     texels: [&Plane; 3],
     weights: &Plane,
     low: &Channels,
@@ -225,13 +223,9 @@ fn principal<const WEIGHTED: bool>(
     let mut covariance = [[0.0; LANES]; 6];
     let pairs = [[red, red], [red, green], [red, blue], [green, green], [green, blue], [blue, blue]];
     for (covariance, [a, b]) in covariance.iter_mut().zip(pairs) {
-        if WEIGHTED {
-            let mut weighted = [[0; LANES]; TEXELS];
-            products(weights, a, &mut weighted);
-            weighted_sum::<true>(&weighted, b, covariance);
-        } else {
-            weighted_sum::<false>(a, b, covariance);
-        }
+        let mut weighted = [[0; LANES]; TEXELS];
+        products(weights, a, &mut weighted);
+        weighted_sum::<true>(&weighted, b, covariance);
     }
     let mut axis = [[0_i16; LANES]; 3];
     principal_axis(&covariance, &mut axis);
@@ -354,23 +348,16 @@ fn place(texels: [&Plane; 3], i: usize, l: usize, slopes: &Channels, base: &Row)
     place.clamp(0, 3)
 }
 
-/// Moves the ends to the least squares of the places found, and again; keeps what has the least error.
+/// Moves the ends to the least squares of the places found.
 #[inline(always)]
 fn refine<const WEIGHTED: bool>(texels: [&Plane; 3], weights: &Plane, moments: &Moments, ends: &mut Ends) {
-    let mut best = [f32::INFINITY; LANES];
-    let mut tried = Ends { packed: ends.packed, values: ends.values };
-    for round in 0..=REFINEMENTS {
-        let (mut slopes, mut base) = ([[0; LANES]; 3], [0; LANES]);
-        projection(&tried, &mut slopes, &mut base);
-        let mut sums = Sums { places: [0.0; LANES], squares: [0.0; LANES], products: [[0.0; LANES]; 3] };
-        add_up::<WEIGHTED>(texels, weights, &slopes, &base, &mut sums);
-        keep(&tried, moments, &sums, ends, &mut best);
-        if round < REFINEMENTS {
-            let mut reals = [[[0.0; LANES]; 3]; 2];
-            least_squares(moments, &sums, &mut reals);
-            quantise(&reals, &mut tried);
-        }
-    }
+    let (mut slopes, mut base) = ([[0; LANES]; 3], [0; LANES]);
+    projection(ends, &mut slopes, &mut base);
+    let mut sums = Sums { places: [0.0; LANES], squares: [0.0; LANES], products: [[0.0; LANES]; 3] };
+    add_up::<WEIGHTED>(texels, weights, &slopes, &base, &mut sums);
+    let mut reals = [[[0.0; LANES]; 3]; 2];
+    least_squares(moments, &sums, &mut reals);
+    quantise(&reals, ends);
 }
 
 /// The places of all texels.
@@ -414,35 +401,6 @@ fn products(a: &Plane, b: &Plane, out: &mut Plane) {
     for l in 0..LANES {
         let products = each!(|i| a[i][l] * b[i][l]);
         each!(|i| out[i][l] = products[i]);
-    }
-}
-
-/// Takes what was tried where its error is the least.
-#[inline(always)]
-fn keep(tried: &Ends, moments: &Moments, sums: &Sums, ends: &mut Ends, best: &mut [f32; LANES]) {
-    // Without the squares of the values, which are the same for all that is tried.
-    let mut errors = [0.0; LANES];
-    for c in 0..3 {
-        let (from, to) = (&tried.values[0][c], &tried.values[1][c]);
-        let (total, products) = (&moments.values[c], &sums.products[c]);
-        for l in 0..LANES {
-            let step = f32::from(to[l] - from[l]) * (1.0 / 3.0);
-            let from = f32::from(from[l]);
-            errors[l] += from * (moments.weight[l] * from - 2.0 * total[l])
-                + step * (step * sums.squares[l] + 2.0 * (from * sums.places[l] - products[l]));
-        }
-    }
-    // All ones where this is better. Masks, since of a choice the compiler makes one between addresses.
-    let mut better = [0; LANES];
-    for l in 0..LANES {
-        better[l] = if errors[l] < best[l] { -1 } else { 0 };
-        best[l] = best[l].min(errors[l]);
-    }
-    for (ends, tried) in ends.packed.iter_mut().zip(&tried.packed) {
-        choose(&better, tried, ends);
-    }
-    for (ends, tried) in ends.values.as_flattened_mut().iter_mut().zip(tried.values.as_flattened()) {
-        choose(&better, tried, ends);
     }
 }
 

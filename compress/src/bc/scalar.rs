@@ -1,7 +1,7 @@
 //! The kernel of BC4, and of alpha in BC3: a batch of blocks at a time, see `batch`.
 //!
-//! The range of the block gives the end points. [`Effort::Fitted`] moves them to the least squares of the places found,
-//! and tries the other kind of block where values touch the ends of the scale; [`Effort::Searched`] then tries the
+//! The range of the block gives the end points, in both kinds of block where values touch the ends of the scale.
+//! [`Effort::Fitted`] moves them to the least squares of the places found; [`Effort::Searched`] then tries the
 //! neighbours of both end points, since least squares know nothing of rounding, which in a narrow range matters as much.
 //! What has the least error of all tried is kept, measured against the values that the decoder gives. A block whose
 //! values span at most 7 is kept exactly at every effort.
@@ -12,16 +12,16 @@ use super::endpoints::TEXELS;
 /// How much is tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd)]
 pub(super) enum Effort {
-    /// The range of the values.
-    Range,
-    /// And its least squares, in both kinds of block.
+    /// The range of the values, in both kinds of block.
+    Ranges,
+    /// And its least squares.
     Fitted,
     /// And the neighbours of the end points.
     Searched,
 }
 
-/// Rounds of least squares, and of trying neighbours.
-const FITS: usize = 1;
+/// Neighbours of end points, and rounds of trying them.
+const NEIGHBOURS: [(i16, i16); 8] = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)];
 const SEARCHES: usize = 3;
 
 /// Steps from one end point to the other in the two kinds of block.
@@ -53,30 +53,25 @@ pub(super) fn encode(plane: &Plane, effort: Effort, blocks: &mut [Words; LANES])
         varied[l] = if low[l] == high[l] { 0 } else { -1 };
     }
     let mut words = [[0; LANES]; 4];
-    if effort == Effort::Range {
-        widen(&mut low, &mut high, SEVENTHS);
-        pack_sevenths(plane, [&low, &high], &mut words);
-    } else {
-        // A block takes the second kind only where it touches an end itself, not where one beside it does.
-        let (mut touches, mut touching) = ([0; LANES], 0);
-        for l in 0..LANES {
-            touches[l] = if low[l] == 0 || high[l] == 255 { varied[l] } else { 0 };
-            touching |= touches[l];
-        }
-        widen(&mut low, &mut high, SEVENTHS);
-        let sevenths = refined::<SEVENTHS>(plane, low, high, effort);
-        pack_sevenths(plane, [&sevenths.low, &sevenths.high], &mut words);
-        if touching != 0 {
-            inner_range(plane, &mut low, &mut high);
-            widen(&mut low, &mut high, FIFTHS);
-            let fifths = refined::<FIFTHS>(plane, low, high, effort);
-            let mut others = [[0; LANES]; 4];
-            pack_fifths(plane, &fifths, &mut others);
-            for (word, other) in words.iter_mut().zip(&others) {
-                for l in 0..LANES {
-                    let better = if fifths.error[l] < sevenths.error[l] { touches[l] as u16 } else { 0 };
-                    word[l] ^= (word[l] ^ other[l]) & better;
-                }
+    // A block takes the second kind only where it touches an end itself, not where one beside it does.
+    let (mut touches, mut touching) = ([0; LANES], 0);
+    for l in 0..LANES {
+        touches[l] = if low[l] == 0 || high[l] == 255 { varied[l] } else { 0 };
+        touching |= touches[l];
+    }
+    widen(&mut low, &mut high, SEVENTHS);
+    let sevenths = refined::<SEVENTHS>(plane, low, high, effort);
+    pack_sevenths(plane, [&sevenths.low, &sevenths.high], &mut words);
+    if touching != 0 {
+        inner_range(plane, &mut low, &mut high);
+        widen(&mut low, &mut high, FIFTHS);
+        let fifths = refined::<FIFTHS>(plane, low, high, effort);
+        let mut others = [[0; LANES]; 4];
+        pack_fifths(plane, &fifths, &mut others);
+        for (word, other) in words.iter_mut().zip(&others) {
+            for l in 0..LANES {
+                let better = if fifths.error[l] < sevenths.error[l] { touches[l] as u16 } else { 0 };
+                word[l] ^= (word[l] ^ other[l]) & better;
             }
         }
     }
@@ -116,22 +111,24 @@ fn widen(low: &mut Row, high: &mut Row, steps: i16) {
 fn refined<const STEPS: i16>(plane: &Plane, low: Row, high: Row, effort: Effort) -> Fit {
     let mut best = Fit { low, high, error: [i16::MAX; LANES] };
     let mut tried = (low, high);
-    for _ in 0..FITS {
-        try_ends::<STEPS>(plane, &tried.0, &tried.1, &mut best);
-        least_squares::<STEPS>(plane, &mut tried.0, &mut tried.1);
-    }
     try_ends::<STEPS>(plane, &tried.0, &tried.1, &mut best);
+    if effort >= Effort::Fitted {
+        least_squares::<STEPS>(plane, &mut tried.0, &mut tried.1);
+        try_ends::<STEPS>(plane, &tried.0, &tried.1, &mut best);
+    }
     if effort == Effort::Searched {
         for _ in 0..SEARCHES {
             let (low, high) = (best.low, best.high);
-            for number in 0..9 {
-                let (down, up) = (number / 3 - 1, number % 3 - 1);
+            for (down, up) in NEIGHBOURS {
                 let mut ends = (low, high);
                 for l in 0..LANES {
                     ends.0[l] = (low[l] + down).clamp(0, 254);
                     ends.1[l] = (high[l] + up).min(255).max(ends.0[l] + 1);
                 }
                 try_ends::<STEPS>(plane, &ends.0, &ends.1, &mut best);
+            }
+            if best.low == low && best.high == high {
+                break;
             }
         }
     }

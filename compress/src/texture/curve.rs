@@ -5,197 +5,223 @@
 //! of a block is nearly straight, its ends are the block's end points and the way along is the index: no colour
 //! is looked up, no axis is sought. Opacity is the block of BC4 in BC3, from its own range.
 //!
-//! Plain loops over arrays of whole numbers, one operation of one width at a time, so that they are vectorised where
-//! this is inlined; the results are exact, so the bytes do not depend on the instructions used.
+//! All is done in whole numbers, so the bytes do not depend on the instructions used.
 
-use super::rows::{EDGE, Group, VOXELS};
+#![expect(clippy::needless_range_loop, reason = "loops over lanes, the same in all arrays, must vectorise")]
+
+use super::rows::{Block, EDGE, VOXELS};
 use super::table::ColourTable;
-use crate::simd::Simd;
+use crate::bc::fast::group::{GROUP, Parts, PerBlock, stored};
+use crate::simd::{Simd, in_each_kind};
 
-/// Blocks encoded together.
-pub(super) const BATCH: usize = 64;
+/// The places of a block's voxels, opacity in the low half, the way along in the high half; rows 0, 2, 1 and 3.
+type Places = [u32; VOXELS];
 
-/// Blocks that loops are rounded up to, so that no instruction is narrower than it could be.
-const LANES: usize = 32;
+/// Where a row of a block stands in [`Places`].
+const ROWS: [usize; EDGE] = [0, 2, 1, 3];
 
-/// A number for each block.
-type PerBlock<T> = [T; BATCH];
-
-/// Blocks that wait to be encoded. Voxel by voxel, so that a loop over the blocks does the same in each.
-#[derive(Debug)]
+/// Blocks that wait to be encoded.
+#[derive(Debug, Default)]
 pub(super) struct Batch {
-    /// The place of each voxel: opacity in the low half, the way along in the high half.
-    places: [PerBlock<u32>; VOXELS],
-    /// The ways along of the ends of the block's part of the curve, and the colours there.
+    places: PerBlock<Places>,
+    /// The ways along of the ends of the block's part of the curve, and the colours there in 5:6:5 bits.
     from: PerBlock<u16>,
     to: PerBlock<u16>,
-    ends: PerBlock<[[u8; 4]; 2]>,
+    first: PerBlock<u32>,
+    second: PerBlock<u32>,
     /// Which block of the output each is.
     at: PerBlock<u32>,
     /// How many wait.
     len: usize,
 }
 
-impl Batch {
-    pub(super) fn new() -> Self {
-        Self {
-            places: [[0; BATCH]; VOXELS],
-            from: [0; BATCH],
-            to: [0; BATCH],
-            ends: [[[0; 4]; 2]; BATCH],
-            at: [0; BATCH],
-            len: 0,
-        }
-    }
+/// What the indices of blocks are found with.
+#[derive(Debug, Default)]
+struct Scales {
+    /// The greatest way along, and where the indices change in the way down from it; both less 2¹⁵.
+    to: PerBlock<u16>,
+    halfway: [PerBlock<i16>; 3],
+    /// The greater end of opacity, how far the other is below it, and how that becomes sevenths, see [`Sevenths`].
+    top: PerBlock<u16>,
+    span: PerBlock<u16>,
+    unit: PerBlock<u16>,
+    factor: PerBlock<u16>,
+}
 
-    /// Adds block `i` of a group, whose indices are in `[low, high]`, as block `at` of the output; says whether the
-    /// batch is full.
+impl Batch {
+    /// Adds a block, whose indices are in `[low, high]`, as block `at` of the output; says whether the batch is full.
     #[inline(always)]
     pub(super) fn push(
         &mut self,
-        group: Group<'_>,
-        i: usize,
+        block: Block<'_>,
         [low, high]: [u16; 2],
         table: &ColourTable,
         at: usize,
     ) -> bool {
-        let (places, b) = (table.places(), self.len & (BATCH - 1));
-        for (j, places_of_row) in self.places.as_chunks_mut::<EDGE>().0.iter_mut().enumerate() {
-            for (index, place) in group.block_row(i, j).iter().zip(places_of_row) {
-                place[b] = places[usize::from(*index)];
+        let (places, b) = (table.places(), self.len & (GROUP - 1));
+        let own = self.places[b].as_chunks_mut::<EDGE>().0;
+        for (row, indices) in ROWS.into_iter().zip(block) {
+            for (index, place) in indices.iter().zip(&mut own[row]) {
+                *place = places[usize::from(*index)];
             }
         }
         self.from[b] = (places[usize::from(low)] >> 16) as u16;
         self.to[b] = (places[usize::from(high)] >> 16) as u16;
-        self.ends[b] = [table.colours()[usize::from(low)], table.colours()[usize::from(high)]];
+        self.first[b] = table.packed()[usize::from(high)].into();
+        self.second[b] = table.packed()[usize::from(low)].into();
         self.at[b] = at as u32;
         self.len = b + 1;
-        self.len == BATCH
+        self.len == GROUP
     }
 
     /// Encodes what waits into its places in `blocks`: BC3, or BC1 if a block has 8 bytes.
     pub(super) fn flush<const BYTES: usize>(&mut self, blocks: &mut [[u8; BYTES]], simd: Simd) {
-        match simd {
-            Simd::Plain => self.encode(blocks),
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx2(_) => {
-                #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-                // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
-                unsafe {
-                    self.encode_avx2(blocks);
-                }
-            }
+        if self.len > 0 {
+            encode(self, blocks, simd);
+            self.len = 0;
         }
-        self.len = 0;
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-    fn encode_avx2<const BYTES: usize>(&self, blocks: &mut [[u8; BYTES]]) {
-        self.encode(blocks);
     }
 
     #[inline(always)]
-    fn encode<const BYTES: usize>(&self, blocks: &mut [[u8; BYTES]]) {
-        if self.len == 0 {
-            return;
-        }
-        let lanes = self.len.next_multiple_of(LANES).min(BATCH);
-        let colours = self.colours(lanes);
-        for (block, at) in colours[..self.len].iter().zip(self.at) {
-            blocks[at as usize][BYTES - 8..].copy_from_slice(&block.to_le_bytes());
+    fn encode<const BYTES: usize>(
+        &self,
+        blocks: &mut [[u8; BYTES]],
+        opacities: impl Fn(&Places) -> [u16; 2],
+        indices: impl Fn(&Places, &Scales, usize) -> [[u32; 2]; 2],
+    ) {
+        let (mut parts, mut scales) = (Parts::default(), Scales::default());
+        parts.order_ends(&self.first, &self.second);
+        for l in 0..GROUP {
+            let way = u32::from(self.to[l].wrapping_sub(self.from[l]));
+            scales.to[l] = self.to[l] ^ 0x8000;
+            for (halfway, sixths) in scales.halfway.iter_mut().zip([1, 3, 5]) {
+                halfway[l] = ((way * sixths / 6) as u16 ^ 0x8000) as i16;
+            }
         }
         if BYTES == 16 {
-            let opacities = self.opacities(lanes);
-            for (block, at) in opacities[..self.len].iter().zip(self.at) {
-                blocks[at as usize][..8].copy_from_slice(&block.to_le_bytes());
+            let mut ranges = [[0; GROUP]; 2];
+            for l in 0..self.len.min(GROUP) {
+                [ranges[0][l], ranges[1][l]] = opacities(&self.places[l]);
             }
+            let [lows, highs] = ranges.map(|row| row.map(|end| ((u32::from(end) + 128) / 257) as u16));
+            for l in 0..GROUP {
+                let Sevenths { unit, factor } = SEVENTHS[usize::from(highs[l] - lows[l]) & 255];
+                scales.top[l] = highs[l] * 257;
+                scales.span[l] = (highs[l] - lows[l]) * 257;
+                (scales.unit[l], scales.factor[l]) = (unit, factor);
+            }
+            parts.take_alphas(&highs, &lows);
+        }
+        for l in 0..self.len.min(GROUP) {
+            parts.indices[l] = indices(&self.places[l], &scales, l);
+        }
+        let all = parts.blocks();
+        for l in 0..self.len.min(GROUP) {
+            let mut block = all[l];
+            if self.first[l] == self.second[l] {
+                // Index 3 of ends that are alike is no colour in BC1.
+                block[1] &= 0xFFFF_FFFF;
+            }
+            stored(block, &mut blocks[self.at[l] as usize]);
         }
     }
+}
 
-    /// The blocks of colours between the ends.
-    #[inline(always)]
-    fn colours(&self, lanes: usize) -> PerBlock<u64> {
-        // The ways from the first end, that of the greatest sample, halfway between the thirds.
-        let mut halfway = [[0_u16; BATCH]; 3];
-        for (halfway, sixths) in halfway.iter_mut().zip([1, 3, 5]) {
-            for (halfway, (from, to)) in halfway.iter_mut().zip(self.from.iter().zip(&self.to)) {
-                *halfway = (u32::from(to.wrapping_sub(*from)) * sixths / 6) as u16;
-            }
-        }
-        // Two bits a voxel, eight voxels a number.
-        let mut thirds = [[0_u16; BATCH]; 2];
-        for (i, places) in self.places.iter().enumerate() {
-            let (thirds, shift) = (&mut thirds[i / 8], 2 * (i as u16 % 8));
-            for b in 0..lanes {
-                let way = self.to[b].wrapping_sub((places[b] >> 16) as u16);
-                let third = u16::from(way > halfway[0][b])
-                    + u16::from(way > halfway[1][b])
-                    + u16::from(way > halfway[2][b]);
-                thirds[b] |= third << shift;
-            }
-        }
-        let mut blocks = [0; BATCH];
-        for b in 0..lanes {
-            let [low, high] = self.ends[b];
-            let (c0, c1) = (packed(high), packed(low));
-            let thirds = u64::from(thirds[0][b]) | u64::from(thirds[1][b]) << 16;
-            // Thirds of the way from the first colour have the indices 0, 2, 3, 1.
-            let (ones, twos) = (thirds & 0x5555_5555, thirds >> 1 & 0x5555_5555);
-            let indices = (ones ^ twos) << 1 | twos;
-            // The greater end first, else it would be another mode in BC1; 0 and 1 change places then, 2 and 3 too.
-            let indices = indices ^ if c0 < c1 { 0x5555_5555 } else { 0 };
-            let indices = if c0 == c1 { 0 } else { indices };
-            blocks[b] = c0.max(c1) | c0.min(c1) << 16 | indices << 32;
-        }
-        blocks
+in_each_kind! {
+    fn encode<const BYTES: usize>(batch: &Batch, blocks: &mut [[u8; BYTES]]),
+    plain batch.encode(blocks, plain::opacities, plain::indices),
+    wide batch.encode(
+        blocks,
+        |places| avx2::opacities(places),
+        |places, scales, l| avx2::indices::<BYTES>(places, scales, l),
+    )
+}
+
+/// What is found block by block, in plain arithmetic.
+mod plain {
+    use super::{Places, ROWS, Scales, VOXELS};
+    use crate::bc::fast::{INDICES_2, INDICES_3};
+    use crate::texture::rows::EDGE;
+
+    /// The least and the greatest opacity.
+    pub(super) fn opacities(places: &Places) -> [u16; 2] {
+        let opacities = places.map(|place| place as u16);
+        [opacities.into_iter().fold(u16::MAX, u16::min), opacities.into_iter().fold(0, u16::max)]
     }
 
-    /// The blocks of opacities.
-    #[inline(always)]
-    fn opacities(&self, lanes: usize) -> PerBlock<u64> {
-        let mut opacities = [[0; BATCH]; VOXELS];
-        let (mut low, mut high) = ([u16::MAX; BATCH], [0; BATCH]);
-        for (places, opacities) in self.places.iter().zip(&mut opacities) {
-            for b in 0..lanes {
-                let opacity = places[b] as u16;
-                opacities[b] = opacity;
-                low[b] = low[b].min(opacity);
-                high[b] = high[b].max(opacity);
-            }
+    /// The index bits of colour and of opacity, of rows 0 and 1, and of rows 2 and 3.
+    pub(super) fn indices(places: &Places, scales: &Scales, l: usize) -> [[u32; 2]; 2] {
+        let (mut colour, mut opacity) = (0_u32, 0_u64);
+        for i in 0..VOXELS {
+            let place = places[ROWS[i / EDGE] * EDGE + i % EDGE];
+            let way = scales.to[l].wrapping_sub((place >> 16) as u16) as i16;
+            let thirds = scales.halfway.iter().filter(|halfway| way > halfway[l]).count();
+            colour |= u32::from(INDICES_2[thirds]) << (2 * i);
+            let down = scales.top[l].saturating_sub(place as u16).min(scales.span[l]);
+            let down = u32::from(down.wrapping_mul(scales.unit[l]));
+            let sevenths = ((down * u32::from(scales.factor[l])) >> 16) + 0x800 >> 12;
+            opacity |= u64::from(INDICES_3[sevenths as usize & 7]) << (3 * i);
         }
-        let mut scales = [[0_u16; BATCH]; 4];
-        for b in 0..lanes {
-            let [first, last] = [high[b], low[b]].map(|end| (u32::from(end) + 128) / 257);
-            let Sevenths { unit, factor } = SEVENTHS[(first - last) as usize & 255];
-            (high[b], low[b]) = (first as u16, last as u16);
-            let [top, span, unit, factor] = [first as u16 * 257, (first - last) as u16 * 257, unit, factor];
-            for (scale, value) in scales.iter_mut().zip([top, span, unit, factor]) {
-                scale[b] = value;
-            }
+        [[colour & 0xFFFF, (opacity & 0xFF_FFFF) as u32], [colour >> 16, (opacity >> 24) as u32]]
+    }
+}
+
+/// The same in AVX2.
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use std::arch::x86_64::{
+        __m256i, _mm_cvtsi128_si32, _mm_max_epu16, _mm_min_epu16, _mm_minpos_epu16, _mm_set1_epi16,
+        _mm_xor_si128, _mm256_add_epi16, _mm256_blend_epi16, _mm256_castsi256_si128, _mm256_cmpgt_epi16,
+        _mm256_extracti128_si256, _mm256_min_epu16, _mm256_mulhi_epu16, _mm256_mullo_epi16,
+        _mm256_packus_epi32, _mm256_set1_epi16, _mm256_setzero_si256, _mm256_srli_epi16, _mm256_srli_epi32,
+        _mm256_sub_epi16, _mm256_subs_epu16,
+    };
+
+    use super::{Places, Scales};
+    use crate::bc::fast::avx2::packed_indices;
+
+    #[inline]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+    fn halves(places: &Places) -> [__m256i; 2] {
+        bytemuck::cast(*places)
+    }
+
+    /// The opacities, rows 0 to 3 in order.
+    #[inline]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+    fn opacity(places: &Places) -> __m256i {
+        let [even, odd] = halves(places).map(|half| _mm256_blend_epi16::<0xAA>(half, _mm256_setzero_si256()));
+        _mm256_packus_epi32(even, odd)
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+    pub(super) fn opacities(places: &Places) -> [u16; 2] {
+        let all = opacity(places);
+        let (first, second) = (_mm256_castsi256_si128(all), _mm256_extracti128_si256::<1>(all));
+        let low = _mm_cvtsi128_si32(_mm_minpos_epu16(_mm_min_epu16(first, second)));
+        let ones = _mm_set1_epi16(-1);
+        let high = _mm_cvtsi128_si32(_mm_minpos_epu16(_mm_xor_si128(_mm_max_epu16(first, second), ones)));
+        [low as u16, !(high as u16)]
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+    pub(super) fn indices<const BYTES: usize>(places: &Places, scales: &Scales, l: usize) -> [[u32; 2]; 2] {
+        let all = |value: u16| _mm256_set1_epi16(value as i16);
+        let [even, odd] = halves(places).map(|half| _mm256_srli_epi32::<16>(half));
+        let way = _mm256_sub_epi16(all(scales.to[l]), _mm256_packus_epi32(even, odd));
+        let passed = |i: usize| _mm256_cmpgt_epi16(way, _mm256_set1_epi16(scales.halfway[i][l]));
+        let thirds = _mm256_add_epi16(_mm256_add_epi16(passed(0), passed(1)), passed(2));
+        let thirds = _mm256_sub_epi16(_mm256_setzero_si256(), thirds);
+        if BYTES == 8 {
+            return packed_indices(thirds, thirds);
         }
-        let [top, span, unit, factor] = &scales;
-        // Three bits a voxel, four voxels a number.
-        let mut sevenths = [[0_u16; BATCH]; 4];
-        for (i, opacities) in opacities.iter().enumerate() {
-            let (sevenths, shift) = (&mut sevenths[i / 4], 3 * (i as u16 % 4));
-            for b in 0..lanes {
-                let from_top = top[b].saturating_sub(opacities[b]).min(span[b]).wrapping_mul(unit[b]);
-                let place = ((u32::from(from_top) * u32::from(factor[b])) >> 16) as u16;
-                // Sevenths from the first end have the indices 0, then 2 to 7, then 1.
-                let next = ((place + 0x1800) >> 12) & 7;
-                let index = next ^ u16::from(next < 2);
-                sevenths[b] |= index << shift;
-            }
-        }
-        let mut blocks = [0; BATCH];
-        for b in 0..lanes {
-            let indices = (0..4).fold(0, |sum, i| sum | u64::from(sevenths[i][b]) << (12 * i));
-            // Ends alike are another mode, where 0 is the first end, too.
-            let indices = if high[b] == low[b] { 0 } else { indices };
-            blocks[b] = u64::from(high[b] | low[b] << 8) | indices << 16;
-        }
-        blocks
+        let down =
+            _mm256_min_epu16(_mm256_subs_epu16(all(scales.top[l]), opacity(places)), all(scales.span[l]));
+        let down = _mm256_mullo_epi16(down, all(scales.unit[l]));
+        let sevenths = _mm256_add_epi16(_mm256_mulhi_epu16(down, all(scales.factor[l])), all(0x800));
+        packed_indices(thirds, _mm256_srli_epi16::<12>(sevenths))
     }
 }
 
@@ -222,27 +248,9 @@ static SEVENTHS: [Sevenths; 256] = {
     table
 };
 
-/// A colour in 5:6:5 bits, rounded to the nearest.
-#[inline(always)]
-fn packed([red, green, blue, _]: [u8; 4]) -> u64 {
-    let [red, green, blue] = [red, green, blue].map(u64::from);
-    // Exact for all of 8 bits: (31·v + 127)/255 and (63·v + 127)/255.
-    ((red * 249 + 1014) >> 11) << 11 | ((green * 253 + 505) >> 10) << 5 | ((blue * 249 + 1014) >> 11)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn colours_of_8_bits_are_rounded_to_the_nearest_of_5_and_6() {
-        for v in 0..=255_u8 {
-            let nearest = |most: f64| (f64::from(v) * most / 255.0).round() as u64;
-            assert_eq!(packed([v, 0, 0, 0]) >> 11, nearest(31.0), "red {v}");
-            assert_eq!(packed([0, v, 0, 0]) >> 5, nearest(63.0), "green {v}");
-            assert_eq!(packed([0, 0, v, 0]), nearest(31.0), "blue {v}");
-        }
-    }
 
     #[test]
     fn sevenths_are_the_nearest_for_every_span_and_distance() {

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::bricks::SkipMap;
 use super::curve;
-use super::rows::{EDGE, GROUP, Group, Ranges, Rows};
+use super::rows::{Block, EDGE, GROUP, Ranges, Rows};
 use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
@@ -24,7 +24,7 @@ use crate::simd::Simd;
 const TASK_BLOCKS: usize = 2048;
 
 /// Blocks that are handed to a kernel together.
-const BATCH: usize = curve::BATCH;
+const BATCH: usize = 64;
 
 /// Blocks of texels that wait to be encoded; `N` bytes a texel.
 #[derive(Debug)]
@@ -41,12 +41,12 @@ impl<const N: usize> TexelBatch<N> {
         Self { rows: [[[0; N]; BATCH * EDGE]; EDGE], at: [0; BATCH], len: 0 }
     }
 
-    /// Adds block `i` of a group, as block `at` of the output; says whether the batch is full.
+    /// Adds a block, as block `at` of the output; says whether the batch is full.
     #[inline(always)]
-    fn push(&mut self, group: Group<'_>, i: usize, at: usize, texel: impl Fn(u16) -> [u8; N]) -> bool {
-        for (j, row) in self.rows.iter_mut().enumerate() {
+    fn push(&mut self, block: Block<'_>, at: usize, texel: impl Fn(u16) -> [u8; N]) -> bool {
+        for (row, indices) in self.rows.iter_mut().zip(block) {
             let texels = &mut row[self.len * EDGE..][..EDGE];
-            for (out, index) in texels.iter_mut().zip(group.block_row(i, j)) {
+            for (out, index) in texels.iter_mut().zip(indices) {
                 *out = texel(*index);
             }
         }
@@ -74,6 +74,31 @@ impl<const N: usize> TexelBatch<N> {
     }
 }
 
+/// Some blocks of a row.
+#[derive(Debug)]
+struct List {
+    blocks: Vec<u32>,
+    len: usize,
+}
+
+impl List {
+    /// Room for the blocks of a row.
+    fn new(blocks: usize) -> Self {
+        Self { blocks: vec![0; blocks + 1], len: 0 }
+    }
+
+    /// Adds a block if it is asked for.
+    #[inline(always)]
+    fn add(&mut self, block: usize, asked: bool) {
+        self.blocks[self.len] = block as u32;
+        self.len += usize::from(asked);
+    }
+
+    fn blocks(&self) -> impl Iterator<Item = usize> {
+        self.blocks[..self.len].iter().map(|block| *block as usize)
+    }
+}
+
 /// What one thread works with.
 #[derive(Debug)]
 struct Scratch {
@@ -81,6 +106,9 @@ struct Scratch {
     curve: Box<curve::Batch>,
     colours: Box<TexelBatch<4>>,
     scalars: Box<TexelBatch<1>>,
+    /// Blocks of a row: those on the curve, and those that are to be looked at one by one.
+    straight: List,
+    others: List,
     /// Of each block of a row, the run that it is known to be of without looking.
     known: Vec<Option<u16>>,
 }
@@ -89,9 +117,11 @@ impl Scratch {
     fn new(blocks: usize) -> Self {
         Self {
             rows: Rows::new(blocks),
-            curve: Box::new(curve::Batch::new()),
+            curve: Box::default(),
             colours: Box::new(TexelBatch::new()),
             scalars: Box::new(TexelBatch::new()),
+            straight: List::new(blocks),
+            others: List::new(blocks),
             known: vec![None; blocks],
         }
     }
@@ -194,6 +224,7 @@ fn colour_task<const BYTES: usize>(
         format,
         options: job.options,
         simd: job.simd,
+        on_curve: job.options.level == Level::Fast && format != BlockFormat::Bc7,
         curve: &mut scratch.curve,
         colours: &mut scratch.colours,
         blocks,
@@ -211,10 +242,8 @@ fn colour_task<const BYTES: usize>(
             } else {
                 let from = [x + span.start, y, z];
                 scratch.rows.read(&job.volume, table.domain(), from, span.len(), job.simd);
-                for first in (0..span.len()).step_by(GROUP) {
-                    let count = GROUP.min(span.len() - first);
-                    task.group(scratch.rows.group(first / GROUP), at + first, count);
-                }
+                task.sort(&scratch.rows, at, span.len(), &mut scratch.straight, &mut scratch.others);
+                task.encode(&scratch.rows, at, &scratch.straight, &scratch.others);
             }
         }
     }
@@ -229,6 +258,8 @@ struct ColourTask<'a, const BYTES: usize> {
     format: BlockFormat,
     options: EncodeOptions,
     simd: Simd,
+    /// Whether blocks that lie on the curve are encoded from their places on it.
+    on_curve: bool,
     curve: &'a mut curve::Batch,
     colours: &'a mut TexelBatch<4>,
     blocks: &'a mut [[u8; BYTES]],
@@ -236,40 +267,54 @@ struct ColourTask<'a, const BYTES: usize> {
 }
 
 impl<const BYTES: usize> ColourTask<'_, BYTES> {
-    /// Encodes the first `count` blocks of a group, from block `at` of the output on.
+    /// Makes clear those of `count` blocks read that are of the longest clear run, as most are, from block `at` of the
+    /// output on, and lists those on the curve and all others.
     #[inline(always)]
-    fn group(&mut self, group: Group<'_>, at: usize, count: usize) {
-        let Ranges { low, high, all } = group.ranges;
-        if let Some(run) = self.table.run(*all) {
-            let constant = self.table.constant(run);
-            let block = self.constant(run);
-            self.blocks[at..at + count].fill(block);
-            *(if constant.clear { &mut self.stats.clear } else { &mut self.stats.solid }) += count as u64;
-            return;
-        }
-        if self.format == BlockFormat::Bc7 {
-            for i in 0..count {
-                self.accurate(group, i, [low[i], high[i]], at + i);
+    fn sort(&mut self, rows: &Rows, at: usize, count: usize, straight: &mut List, others: &mut List) {
+        let [from, to] = self.table.clear();
+        let clear = self.constant(self.table.run_at(from));
+        straight.len = 0;
+        others.len = 0;
+        for (group, out) in self.blocks[at..at + count].chunks_mut(GROUP).enumerate() {
+            let Ranges { low, high, all } = rows.ranges(group);
+            for out in &mut *out {
+                *out = clear;
             }
-            return;
+            if all[0] >= from && all[1] <= to {
+                continue;
+            }
+            // Without a branch, since which it is is not to be foreseen.
+            for i in 0..out.len() {
+                let range = [low[i], high[i]];
+                let listed = (range[0] < from) | (range[1] > to);
+                let on_curve = self.table.is_straight(range) & !self.table.is_constant(range) & self.on_curve;
+                straight.add(group * GROUP + i, listed & on_curve);
+                others.add(group * GROUP + i, listed & !on_curve);
+            }
         }
-        // Without branches, since here nothing is likely: each block becomes a constant, and those that are none are
-        // listed to be written again.
-        let mut mixed = [0; GROUP + 1];
-        let mut mixed_count = 0;
-        for (i, block) in self.blocks[at..at + count].iter_mut().enumerate() {
-            let runs = self.table.runs();
-            let (run, last) = (runs[usize::from(low[i])], runs[usize::from(high[i])]);
-            let (constant, is_constant) = (self.table.constant(run), run == last);
-            *block = constant.block();
-            self.stats.clear += u64::from(is_constant) & u64::from(constant.clear);
-            self.stats.solid += u64::from(is_constant) & u64::from(!constant.clear);
-            mixed[mixed_count] = i;
-            mixed_count += usize::from(!is_constant);
+        self.stats.clear += (count - straight.len - others.len) as u64;
+        self.stats.curve += straight.len as u64;
+    }
+
+    /// Encodes the listed blocks, of those read, from block `at` of the output on.
+    #[inline(always)]
+    fn encode(&mut self, rows: &Rows, at: usize, straight: &List, others: &List) {
+        for i in straight.blocks() {
+            if self.curve.push(rows.block(i), rows.range(i), self.table, at + i) {
+                self.curve.flush(self.blocks, self.simd);
+            }
         }
-        for i in &mixed[..mixed_count] {
-            let i = i & (GROUP - 1);
-            self.mixed(group, i, [low[i], high[i]], at + i);
+        for i in others.blocks() {
+            if let Some(run) = self.table.run(rows.range(i)) {
+                self.blocks[at + i] = self.constant(run);
+                let clear = self.table.constant(run).clear;
+                *(if clear { &mut self.stats.clear } else { &mut self.stats.solid }) += 1;
+            } else {
+                let texel = |index| self.table.texels()[usize::from(index)];
+                if self.colours.push(rows.block(i), at + i, texel) {
+                    self.flush_colours();
+                }
+            }
         }
     }
 
@@ -283,32 +328,8 @@ impl<const BYTES: usize> ColourTask<'_, BYTES> {
         block
     }
 
-    /// Encodes block `i` of a group in BC7, as block `at` of the output: beside what its kernel takes, nothing costs.
-    fn accurate(&mut self, group: Group<'_>, i: usize, range: [u16; 2], at: usize) {
-        if let Some(run) = self.table.run(range) {
-            self.blocks[at] = self.constant(run);
-            let clear = self.table.constant(run).clear;
-            *(if clear { &mut self.stats.clear } else { &mut self.stats.solid }) += 1;
-        } else if self.colours.push(group, i, at, |index| self.table.texels()[usize::from(index)]) {
-            self.flush_colours();
-        }
-    }
-
-    /// Encodes block `i` of a group, of more than one look, as block `at` of the output.
-    #[inline(always)]
-    fn mixed(&mut self, group: Group<'_>, i: usize, range: [u16; 2], at: usize) {
-        if self.options.level == Level::Fast && self.table.is_straight(range) {
-            self.stats.curve += 1;
-            if self.curve.push(group, i, range, self.table, at) {
-                self.curve.flush(self.blocks, self.simd);
-            }
-        } else if self.colours.push(group, i, at, |index| self.table.texels()[usize::from(index)]) {
-            self.flush_colours();
-        }
-    }
-
     fn flush_colours(&mut self) {
-        // What is off the curve is seldom, and has colours that a quick fit would lose 4 dB of.
+        // What is off the curve has colours that a quick fit would lose 4 dB of.
         let options =
             if self.format == BlockFormat::Bc7 { self.options } else { self.options.with_level(Level::Best) };
         let (format, simd) = (self.format, self.simd);
@@ -348,9 +369,8 @@ fn scalar_task(
             } else {
                 let from = [x + span.start, y, z];
                 scratch.rows.read(&job.volume, window.domain(), from, span.len(), job.simd);
-                for first in (0..span.len()).step_by(GROUP) {
-                    let count = GROUP.min(span.len() - first);
-                    task.group(scratch.rows.group(first / GROUP), at + first, count);
+                for i in 0..span.len() {
+                    task.block(&scratch.rows, i, at + i);
                 }
             }
         }
@@ -370,18 +390,15 @@ struct ScalarTask<'a> {
 }
 
 impl ScalarTask<'_> {
-    /// Encodes the first `count` blocks of a group, from block `at` of the output on.
+    /// Encodes block `i` of those read, as block `at` of the output.
     #[inline(always)]
-    fn group(&mut self, group: Group<'_>, at: usize, count: usize) {
-        let Ranges { low, high, .. } = group.ranges;
-        for (i, at) in (at..at + count).enumerate().take(GROUP) {
-            let [low, high] = [self.window.texel(low[i]), self.window.texel(high[i])];
-            if low == high {
-                self.blocks[at] = solid(low);
-                self.stats.solid += 1;
-            } else if self.scalars.push(group, i, at, |index| [self.window.texel(index)]) {
-                self.flush();
-            }
+    fn block(&mut self, rows: &Rows, i: usize, at: usize) {
+        let [low, high] = rows.range(i).map(|index| self.window.texel(index));
+        if low == high {
+            self.blocks[at] = solid(low);
+            self.stats.solid += 1;
+        } else if self.scalars.push(rows.block(i), at, |index| [self.window.texel(index)]) {
+            self.flush();
         }
     }
 

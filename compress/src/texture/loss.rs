@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Mapping;
 use super::domain::{Domain, SampleKind};
-use super::rows::{EDGE, GROUP, Group, Rows, VOXELS};
+use super::rows::{EDGE, Rows, VOXELS};
 use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
@@ -247,8 +247,7 @@ fn sum_of_blocks<E: Errors>(
                 for (i, bytes) in blocks.chunks_exact(block_bytes).enumerate() {
                     // Voxels past the edges are not there to be wrong.
                     let inside = [(extent.x() - EDGE * i).min(EDGE), (extent.y() - EDGE * y).min(EDGE)];
-                    let group = buffer.group(i / GROUP);
-                    let [squares, largest] = of_block(group, i % GROUP, inside, errors, bytes);
+                    let [squares, largest] = of_block(buffer, i, inside, errors, bytes);
                     let samples = E::SAMPLES * (inside[0] * inside[1]) as u64;
                     loss = loss.plus(Loss { largest: largest.into(), squares: squares.into(), samples });
                 }
@@ -261,9 +260,9 @@ fn sum_of_blocks<E: Errors>(
 }
 
 /// The error of a block, over the voxels that are inside.
-fn of_block<E: Errors>(group: Group<'_>, i: usize, [x, y]: [usize; 2], errors: &E, block: &[u8]) -> Sum {
-    let lines = (0..y).map(|j| group.block_row(i, j));
-    match errors.known([group.ranges.low[i], group.ranges.high[i]], block) {
+fn of_block<E: Errors>(rows: &Rows, i: usize, [x, y]: [usize; 2], errors: &E, block: &[u8]) -> Sum {
+    let lines = rows.block(i).into_iter().take(y);
+    match errors.known(rows.range(i), block) {
         Known::Exact => [0.0; 2],
         Known::ByIndex(by_index) => {
             lines.flat_map(|line| &line[..x]).fold([0.0; 2], |sum, i| add(sum, by_index[usize::from(*i)]))

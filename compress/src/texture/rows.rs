@@ -1,8 +1,8 @@
 //! The four rows of voxels of a row of blocks, as table indices in the first cache.
 
 use super::domain::Domain;
-use super::volume::Volume;
-use crate::simd::Simd;
+use super::volume::{Samples, Volume};
+use crate::simd::{Simd, in_each_kind};
 
 /// Voxels of a block along x, and along y.
 pub(super) const EDGE: usize = 4;
@@ -22,17 +22,12 @@ pub(super) const WIDE: usize = GROUP * EDGE;
 /// once is half as fast.
 #[derive(Debug)]
 pub(super) struct Rows {
-    indices: [Vec<[u16; WIDE]>; EDGE],
+    groups: Vec<[[u16; WIDE]; EDGE]>,
     ranges: Vec<Ranges>,
 }
 
-/// A group of blocks.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Group<'a> {
-    /// Its four rows.
-    pub(super) rows: [&'a [u16; WIDE]; EDGE],
-    pub(super) ranges: &'a Ranges,
-}
+/// The four rows of a block.
+pub(super) type Block<'a> = [&'a [u16; EDGE]; EDGE];
 
 /// The least and the greatest index of each block of a group, and of all.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -45,9 +40,8 @@ pub(super) struct Ranges {
 impl Rows {
     /// Room for rows of at most `blocks` blocks.
     pub(super) fn new(blocks: usize) -> Self {
-        let row = || vec![[0; WIDE]; blocks.div_ceil(GROUP)];
-        let ranges = vec![Ranges::default(); blocks.div_ceil(GROUP)];
-        Self { indices: [row(), row(), row(), row()], ranges }
+        let groups = blocks.div_ceil(GROUP);
+        Self { groups: vec![[[0; WIDE]; EDGE]; groups], ranges: vec![Ranges::default(); groups] }
     }
 
     /// Reads `count` blocks from block `[x, y, z]` of the volume on. Past the volume's edges, and past the blocks in the
@@ -60,69 +54,84 @@ impl Rows {
         count: usize,
         simd: Simd,
     ) {
-        match simd {
-            Simd::Plain => {
-                self.read_indices(volume, domain, at, count);
-                self.find_ranges(count, ranges);
-            }
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx2(_) => {
-                #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-                // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
-                unsafe {
-                    self.read_avx2(volume, domain, at, count);
-                }
-            }
-        }
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-    fn read_avx2(&mut self, volume: &Volume<'_>, domain: &Domain, at: [usize; 3], count: usize) {
-        self.read_indices(volume, domain, at, count);
-        let [a, b, c, d] = &self.indices;
-        for (i, out) in self.ranges.iter_mut().enumerate().take(count.div_ceil(GROUP)) {
-            *out = ranges_avx2([&a[i], &b[i], &c[i], &d[i]]);
-        }
+        read(self, volume, domain, at, count, simd);
     }
 
     #[inline(always)]
     fn read_indices(&mut self, volume: &Volume<'_>, domain: &Domain, [x, y, z]: [usize; 3], count: usize) {
         let (extent, first) = (volume.extent(), x * EDGE);
         let inside = (count * EDGE).min(extent.x() - first);
-        for (j, row) in self.indices.iter_mut().enumerate() {
-            let row = row[..count.div_ceil(GROUP)].as_flattened_mut();
-            let (row, past) = row.split_at_mut(inside);
-            volume.indices(domain, [first, (y * EDGE + j).min(extent.y() - 1), z], row);
-            past.fill(row.last().copied().unwrap_or_default());
+        let groups = &mut self.groups[..count.div_ceil(GROUP)];
+        for j in 0..EDGE {
+            let at = [first, (y * EDGE + j).min(extent.y() - 1), z];
+            match volume.row(at, inside) {
+                Samples::U8(row) => spread(row, groups, j, |samples, out| domain.indices_u8(samples, out)),
+                Samples::I16(row) => spread(row, groups, j, |samples, out| domain.indices_i16(samples, out)),
+                Samples::U16(row) => spread(row, groups, j, |samples, out| domain.indices_u16(samples, out)),
+                Samples::F32(row) => spread(row, groups, j, |samples, out| domain.indices_f32(samples, out)),
+            }
+            // What is read next, while these are encoded.
+            volume.fetch_ahead(at, inside, EDGE);
         }
     }
 
-    fn find_ranges(&mut self, count: usize, of: impl Fn([&[u16; WIDE]; EDGE]) -> Ranges) {
-        let [a, b, c, d] = &self.indices;
-        for (i, out) in self.ranges.iter_mut().enumerate().take(count.div_ceil(GROUP)) {
-            *out = of([&a[i], &b[i], &c[i], &d[i]]);
-        }
-    }
-
-    /// Group `i` of what was read.
     #[inline(always)]
-    pub(super) fn group(&self, i: usize) -> Group<'_> {
-        let [a, b, c, d] = &self.indices;
-        Group { rows: [&a[i], &b[i], &c[i], &d[i]], ranges: &self.ranges[i] }
+    fn find_ranges(&mut self, count: usize, of: impl Fn(&[[u16; WIDE]; EDGE]) -> Ranges) {
+        for (group, out) in self.groups.iter().zip(&mut self.ranges).take(count.div_ceil(GROUP)) {
+            *out = of(group);
+        }
+    }
+
+    /// The least and the greatest index of block `i` of what was read.
+    #[inline(always)]
+    pub(super) fn range(&self, i: usize) -> [u16; 2] {
+        let Ranges { low, high, .. } = &self.ranges[i / GROUP];
+        [low[i % GROUP], high[i % GROUP]]
+    }
+
+    /// The ranges of group `i` of what was read.
+    #[inline(always)]
+    pub(super) fn ranges(&self, i: usize) -> &Ranges {
+        &self.ranges[i]
+    }
+
+    /// Block `i` of what was read.
+    #[inline(always)]
+    pub(super) fn block(&self, i: usize) -> Block<'_> {
+        let group = &self.groups[i / GROUP];
+        group.each_ref().map(|row| &row.as_chunks().0[i % GROUP])
     }
 }
 
-impl Group<'_> {
-    /// The indices of row `j` of block `i`.
-    #[inline(always)]
-    pub(super) fn block_row(&self, i: usize, j: usize) -> &[u16] {
-        &self.rows[j][i * EDGE..][..EDGE]
+/// Writes the indices of a row of samples as row `j` of the groups; past its end the last is repeated.
+#[inline(always)]
+fn spread<T>(row: &[T], groups: &mut [[[u16; WIDE]; EDGE]], j: usize, indices: impl Fn(&[T], &mut [u16])) {
+    let (whole, rest) = row.as_chunks::<WIDE>();
+    for (samples, group) in whole.iter().zip(&mut *groups) {
+        indices(samples, &mut group[j]);
+    }
+    if let Some(group) = groups.get_mut(whole.len()) {
+        let last = group[j][0];
+        let (row, past) = group[j].split_at_mut(rest.len());
+        indices(rest, row);
+        past.fill(row.last().copied().unwrap_or(last));
+    }
+}
+
+in_each_kind! {
+    fn read(rows: &mut Rows, volume: &Volume<'_>, domain: &Domain, at: [usize; 3], count: usize),
+    plain {
+        rows.read_indices(volume, domain, at, count);
+        rows.find_ranges(count, ranges);
+    },
+    wide {
+        rows.read_indices(volume, domain, at, count);
+        rows.find_ranges(count, |rows| ranges_avx2(rows));
     }
 }
 
 /// The ranges of a group.
-fn ranges(rows: [&[u16; WIDE]; EDGE]) -> Ranges {
+fn ranges(rows: &[[u16; WIDE]; EDGE]) -> Ranges {
     let mut ranges = Ranges { low: [u16::MAX; GROUP], high: [0; GROUP], all: [u16::MAX, 0] };
     for row in rows {
         for (i, index) in row.iter().enumerate() {
@@ -137,8 +146,9 @@ fn ranges(rows: [&[u16; WIDE]; EDGE]) -> Ranges {
 
 /// The same with the instructions for it: the compiler finds the minima of neighbours in no loop reliably.
 #[cfg(target_arch = "x86_64")]
+#[inline]
 #[target_feature(enable = "avx2")]
-fn ranges_avx2([a, b, c, d]: [&[u16; WIDE]; EDGE]) -> Ranges {
+fn ranges_avx2(rows: &[[u16; WIDE]; EDGE]) -> Ranges {
     use std::arch::x86_64::{
         __m256i, _mm_extract_epi16, _mm_minpos_epu16, _mm_packus_epi32, _mm_set1_epi8, _mm_setr_epi8,
         _mm_shuffle_epi8, _mm_xor_si128, _mm256_and_si256, _mm256_castsi256_si128, _mm256_extracti128_si256,
@@ -146,7 +156,7 @@ fn ranges_avx2([a, b, c, d]: [&[u16; WIDE]; EDGE]) -> Ranges {
         _mm256_srli_epi32, _mm256_srli_epi64,
     };
 
-    let [a, b, c, d] = [a, b, c, d].map(|row| bytemuck::cast::<[u16; WIDE], [__m256i; 2]>(*row));
+    let [a, b, c, d] = rows.map(|row| bytemuck::cast::<[u16; WIDE], [__m256i; 2]>(row));
     let (mut least, mut most) = (a, a);
     for i in 0..2 {
         least[i] = _mm256_min_epu16(_mm256_min_epu16(a[i], b[i]), _mm256_min_epu16(c[i], d[i]));
@@ -187,18 +197,17 @@ mod tests {
         };
         for _ in 0..1000 {
             let rows: [[u16; WIDE]; EDGE] = std::array::from_fn(|_| std::array::from_fn(|_| random()));
-            let rows = rows.each_ref();
-            let plain = ranges(rows);
+            let plain = ranges(&rows);
             for i in 0..GROUP {
                 let block = rows.iter().flat_map(|row| &row[i * EDGE..][..EDGE]);
                 assert_eq!(Some(&plain.low[i]), block.clone().min(), "least of block {i}");
                 assert_eq!(Some(&plain.high[i]), block.max(), "greatest of block {i}");
             }
             #[cfg(target_arch = "x86_64")]
-            if let Simd::Avx2(_) = Simd::best() {
+            if Simd::best() != Simd::Plain {
                 // SAFETY: AVX2 was detected.
                 #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-                let ranges = unsafe { ranges_avx2(rows) };
+                let ranges = unsafe { ranges_avx2(&rows) };
                 assert_eq!(ranges, plain, "{rows:?}");
             }
         }

@@ -13,6 +13,9 @@ const ENTRIES: usize = 1 << 16;
 /// hundredths of the square. On two CTs with three functions this costs at most 0.9 dB against 95 %.
 const STRAIGHT_PERCENT_SQUARED: i64 = 49;
 
+/// Stretches of the curve that are told apart.
+const STRETCHES: usize = 64;
+
 /// Fraction bits of [`ColourTable::unit`].
 const UNIT_BITS: u32 = 24;
 
@@ -45,13 +48,19 @@ pub struct ColourTable {
     truth: Vec<[f32; 4]>,
     /// By index: the colour and opacity of the uncompressed texture.
     texels: Box<[[u8; 4]; ENTRIES]>,
-    /// By index: the run of neighbouring values that look the same, by its number.
-    runs: Box<[u16; ENTRIES]>,
+    /// By index: the run of neighbouring values that look the same, by its number, in the low half; in the high half the
+    /// stretch of the curve, below [`STRETCHES`].
+    kinds: Box<[u32; ENTRIES]>,
+    /// By stretch: to the end of which others the colours lie nearly on a line, a bit for each.
+    straight: [u64; STRETCHES],
     /// By index: the place on the curve that the function is. The low half is the opacity in 1/65535; the high half
     /// is the way along the curve of *seen* colours, in 1/65535 of all of it, which never falls.
     places: Box<[u32; ENTRIES]>,
-    /// By index: the colour at that place; of a clear value, that of its run's constant.
+    /// By index: the colour at that place; of a clear value, that of its run's constant. And in 5:6:5 bits.
     colours: Box<[[u8; 4]; ENTRIES]>,
+    packed: Box<[u16; ENTRIES]>,
+    /// The longest run of clear values, first and last index; none is empty, from 1 to 0.
+    clear: [u16; 2],
     /// What one step of the way along the curve is; 2⁻²⁴ of 1/255 of a channel.
     unit: i64,
     /// By run: its constant block.
@@ -75,7 +84,9 @@ impl Constant {
     /// The bytes of BC3, or of BC1 if a block has 8.
     #[inline(always)]
     pub(super) fn block<const BYTES: usize>(&self) -> [u8; BYTES] {
-        std::array::from_fn(|i| self.block[16 - BYTES + i])
+        let mut block = [0; BYTES];
+        block.copy_from_slice(&self.block[16 - BYTES..]);
+        block
     }
 }
 
@@ -126,9 +137,12 @@ impl ColourTable {
             opaque,
             truth: Vec::with_capacity(usize::from(domain.last()) + 1),
             texels: entries(),
-            runs: entries(),
+            kinds: entries(),
+            straight: [0; STRETCHES],
             places: entries(),
             colours: entries(),
+            packed: entries(),
+            clear: [1, 0],
             unit: 0,
             constants: Vec::new(),
             accurate: OnceLock::new(),
@@ -136,6 +150,7 @@ impl ColourTable {
         table.sample(points);
         table.find_runs();
         table.follow_curve();
+        table.find_stretches(points);
         Ok(table)
     }
 
@@ -161,21 +176,22 @@ impl ColourTable {
 
     /// The run that both ends of a range of indices, and so all of it, are in.
     #[inline(always)]
-    pub(super) fn run(&self, [low, high]: [u16; 2]) -> Option<u16> {
-        let run = self.runs[usize::from(low)];
-        (run == self.runs[usize::from(high)]).then_some(run)
+    pub(super) fn run(&self, range: [u16; 2]) -> Option<u16> {
+        self.is_constant(range).then_some(self.run_at(range[0]))
     }
 
-    /// Whether the colours of a range of indices lie nearly on a line.
+    /// Whether both ends of a range of indices, and so all of it, are in one run.
+    #[inline(always)]
+    pub(super) fn is_constant(&self, range: [u16; 2]) -> bool {
+        let [low, high] = range.map(|index| self.run_at(index));
+        low == high
+    }
+
+    /// Whether the colours of a range of indices lie nearly on a line, as far as that is known of its stretches.
     #[inline(always)]
     pub(super) fn is_straight(&self, range: [u16; 2]) -> bool {
-        let [from, to] = range.map(|index| self.places[usize::from(index)] >> 16);
-        let [a, b] = range.map(|index| self.colours[usize::from(index)]);
-        let apart = |c: usize| i32::from(a[c]) - i32::from(b[c]);
-        let [red, green, blue] = [apart(0), apart(1), apart(2)];
-        let chord_squared = i64::from(red * red + green * green + blue * blue);
-        let way = (i64::from(to - from) * self.unit) >> UNIT_BITS;
-        100 * chord_squared >= STRAIGHT_PERCENT_SQUARED * (way * way) || way < SHORT
+        let [low, high] = range.map(|index| self.kinds[usize::from(index)] >> 16);
+        self.straight[low as usize % STRETCHES] >> (high % STRETCHES as u32) & 1 == 1
     }
 
     /// The places on the curve, by index: opacity in the low half, the way along in the high half.
@@ -183,15 +199,21 @@ impl ColourTable {
         &self.places
     }
 
-    /// The colours at those places, by index.
-    pub(super) fn colours(&self) -> &[[u8; 4]; ENTRIES] {
-        &self.colours
+    /// The colours at those places in 5:6:5 bits, by index.
+    pub(super) fn packed(&self) -> &[u16; ENTRIES] {
+        &self.packed
     }
 
-    /// The run of each index.
+    /// The longest run of clear values, first and last index; from 1 to 0 if there are none.
     #[inline(always)]
-    pub(super) fn runs(&self) -> &[u16; ENTRIES] {
-        &self.runs
+    pub(super) fn clear(&self) -> [u16; 2] {
+        self.clear
+    }
+
+    /// The run of an index.
+    #[inline(always)]
+    pub(super) fn run_at(&self, index: u16) -> u16 {
+        self.kinds[usize::from(index)] as u16
     }
 
     /// The constant block of a run.
@@ -249,7 +271,7 @@ impl ColourTable {
         let mut start = 0;
         for run in texels.chunk_by(|a, b| a == b || (a[3] == 0 && b[3] == 0)) {
             let end = start + run.len();
-            self.runs[start..end].fill(self.constants.len() as u16);
+            self.kinds[start..end].fill(self.constants.len() as u32);
             let clear = run[0][3] == 0;
             let texel = if clear {
                 // The colours of the seen neighbours, or the mean of both.
@@ -262,8 +284,13 @@ impl ColourTable {
                 run[0]
             };
             self.constants.push(Constant { clear, texel, block: bc::constant(texel) });
-            for (colour, own) in self.colours[start..end].iter_mut().zip(run) {
-                *colour = if clear { texel } else { *own };
+            for (i, own) in (start..end).zip(run) {
+                self.colours[i] = if clear { texel } else { *own };
+                self.packed[i] = packed(self.colours[i]);
+            }
+            let [from, to] = self.clear.map(usize::from);
+            if clear && (from > to || run.len() > to - from + 1) {
+                self.clear = [start as u16, (end - 1) as u16];
             }
             start = end;
         }
@@ -292,10 +319,63 @@ impl ColourTable {
         }
     }
 
+    /// Numbers the stretches of the curve, between the points and where it begins or ends to be seen, and finds which
+    /// lie on a line together.
+    fn find_stretches(&mut self, points: &[ColourPoint]) {
+        let len = self.truth.len();
+        let kind = |index: usize| {
+            let value = self.domain.value(index as u16);
+            (points.partition_point(|point| point.value <= value), self.texels[index][3] == 0)
+        };
+        let mut stretch = 0_usize;
+        let mut numbers = vec![0; len];
+        for index in 1..len {
+            stretch += usize::from(kind(index) != kind(index - 1));
+            numbers[index] = stretch;
+        }
+        // Of too many, neighbours count as one.
+        let merged = (stretch + 1).div_ceil(STRETCHES);
+        let mut ends: Vec<[u16; 2]> = Vec::new();
+        for (index, number) in numbers.into_iter().enumerate() {
+            let number = number / merged;
+            self.kinds[index] |= (number as u32) << 16;
+            match ends.get_mut(number) {
+                Some([_, last]) => *last = index as u16,
+                None => ends.push([index as u16; 2]),
+            }
+        }
+        for (a, from) in ends.iter().enumerate() {
+            for (b, to) in ends.iter().enumerate().skip(a) {
+                let all = [[from[0], to[0]], [from[0], to[1]], [from[1], to[0]], [from[1], to[1]]];
+                let straight =
+                    all.iter().all(|[low, high]| self.is_near_its_chord([*low.min(high), *high.max(low)]));
+                self.straight[a] |= u64::from(straight) << b;
+            }
+        }
+    }
+
+    /// Whether the colours of a range of indices are near the line from the first to the last.
+    fn is_near_its_chord(&self, range: [u16; 2]) -> bool {
+        let [from, to] = range.map(|index| self.places[usize::from(index)] >> 16);
+        let [a, b] = range.map(|index| self.colours[usize::from(index)]);
+        let apart = |c: usize| i32::from(a[c]) - i32::from(b[c]);
+        let [red, green, blue] = [apart(0), apart(1), apart(2)];
+        let chord_squared = i64::from(red * red + green * green + blue * blue);
+        let way = (i64::from(to - from) * self.unit) >> UNIT_BITS;
+        100 * chord_squared >= STRAIGHT_PERCENT_SQUARED * (way * way) || way < SHORT
+    }
+
     fn constant_colour(&self, index: usize) -> [f32; 3] {
         let [red, green, blue, _] = self.colours[index];
         [red, green, blue].map(|c| f32::from(c) / 255.0)
     }
+}
+
+/// A colour in 5:6:5 bits, rounded to the nearest.
+fn packed([red, green, blue, _]: [u8; 4]) -> u16 {
+    let [red, green, blue] = [red, green, blue].map(u32::from);
+    // Exact for all of 8 bits: (31·v + 127)/255 and (63·v + 127)/255.
+    (((red * 249 + 1014) >> 11) << 11 | ((green * 253 + 505) >> 10) << 5 | ((blue * 249 + 1014) >> 11)) as u16
 }
 
 fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
@@ -309,4 +389,19 @@ fn entries<T: Copy + Default>() -> Box<[T; ENTRIES]> {
     let entries: Result<Box<[T; ENTRIES]>, _> = vec![T::default(); ENTRIES].into_boxed_slice().try_into();
     // The length is right, so the second way, through the stack, is never taken.
     entries.unwrap_or_else(|_| Box::new([T::default(); ENTRIES]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_of_8_bits_are_rounded_to_the_nearest_of_5_and_6() {
+        for v in 0..=255_u8 {
+            let nearest = |most: f64| (f64::from(v) * most / 255.0).round() as u16;
+            assert_eq!(packed([v, 0, 0, 0]) >> 11, nearest(31.0), "red {v}");
+            assert_eq!(packed([0, v, 0, 0]) >> 5, nearest(63.0), "green {v}");
+            assert_eq!(packed([0, 0, v, 0]), nearest(31.0), "blue {v}");
+        }
+    }
 }

@@ -6,7 +6,7 @@ use super::Domain;
 use super::table::ColourTable;
 use super::volume::Volume;
 use super::window::Window;
-use crate::simd::Simd;
+use crate::simd::{Simd, in_each_kind};
 
 /// Voxels of one task, about.
 const TASK_VOXELS: usize = 1 << 15;
@@ -79,23 +79,15 @@ fn fill<const N: usize>(volume: &Volume<'_>, map: impl Write<N>, simd: Simd, out
     let row = volume.extent().x();
     let rows = (TASK_VOXELS / row).max(1);
     let (texels, _) = out.as_chunks_mut::<N>();
-    texels.par_chunks_mut(row * rows).enumerate().for_each(|(i, texels)| match simd {
-        Simd::Plain => task(volume, map, i * rows, texels),
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(_) => {
-            #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-            // SAFETY: a value of that variant exists only where AVX2, BMI1, BMI2 and LZCNT were detected.
-            unsafe {
-                task_avx2(volume, map, i * rows, texels);
-            }
-        }
-    });
+    texels
+        .par_chunks_mut(row * rows)
+        .enumerate()
+        .for_each(|(i, texels)| write_rows::<N>(volume, map, i * rows, texels, simd));
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-fn task_avx2<const N: usize>(volume: &Volume<'_>, map: impl Write<N>, first: usize, out: &mut [[u8; N]]) {
-    task(volume, map, first, out);
+in_each_kind! {
+    fn write_rows<const N: usize>(volume: &Volume<'_>, map: impl Write<N>, first: usize, out: &mut [[u8; N]]),
+    task(volume, map, first, out)
 }
 
 /// Writes some rows of voxels, `first` and those after it.

@@ -3,6 +3,7 @@
 use super::TextureError;
 use super::domain::{Domain, SampleKind};
 use crate::Extent3;
+use crate::simd::{LINE_BYTES, fetch_ahead};
 
 /// Samples of a grid as they are stored, `[x, y, z]`, x fastest. A rescale to physical units stays outside: what
 /// maps these to texels is given in stored values.
@@ -107,16 +108,47 @@ impl<'a> Volume<'a> {
         ((low_z + z) * self.grid.y() + low_y + y) * self.grid.x() + low_x + x
     }
 
+    /// The samples of `len` voxels from `[x, y, z]` of the box on, within one row.
+    #[inline(always)]
+    pub(super) fn row(&self, at: [usize; 3], len: usize) -> Samples<'a> {
+        let first = self.offset(at);
+        let at = first..first + len;
+        match self.samples {
+            Samples::U8(samples) => Samples::U8(&samples[at]),
+            Samples::I16(samples) => Samples::I16(&samples[at]),
+            Samples::U16(samples) => Samples::U16(&samples[at]),
+            Samples::F32(samples) => Samples::F32(&samples[at]),
+        }
+    }
+
+    /// Asks for the memory of `len` voxels to be fetched, `rows` below those from `[x, y, z]` of the box on.
+    #[inline(always)]
+    pub(super) fn fetch_ahead(&self, at: [usize; 3], len: usize, rows: usize) {
+        let ahead = rows * self.grid.x();
+        match self.row(at, len) {
+            Samples::U8(row) => lines(row, ahead),
+            Samples::I16(row) => lines(row, ahead),
+            Samples::U16(row) => lines(row, ahead),
+            Samples::F32(row) => lines(row, ahead),
+        }
+    }
+
     /// The table indices of `out.len()` voxels from `[x, y, z]` of the box on, within one row.
     #[inline(always)]
     pub(super) fn indices(&self, domain: &Domain, at: [usize; 3], out: &mut [u16]) {
-        let first = self.offset(at);
-        let at = first..first + out.len();
-        match self.samples {
-            Samples::U8(samples) => domain.indices_u8(&samples[at], out),
-            Samples::I16(samples) => domain.indices_i16(&samples[at], out),
-            Samples::U16(samples) => domain.indices_u16(&samples[at], out),
-            Samples::F32(samples) => domain.indices_f32(&samples[at], out),
+        match self.row(at, out.len()) {
+            Samples::U8(row) => domain.indices_u8(row, out),
+            Samples::I16(row) => domain.indices_i16(row, out),
+            Samples::U16(row) => domain.indices_u16(row, out),
+            Samples::F32(row) => domain.indices_f32(row, out),
         }
+    }
+}
+
+/// Asks for each line of memory that lies `ahead` samples after these.
+#[inline(always)]
+fn lines<T>(samples: &[T], ahead: usize) {
+    for line in samples.chunks(LINE_BYTES / size_of::<T>()) {
+        fetch_ahead(line, ahead);
     }
 }
