@@ -4,7 +4,7 @@
 //! (`KIND` is u8, i16, u16 or f32; CT in HU), else with a phantom. One JSON line per volume, transfer function,
 //! threads and way: the least time of all rounds, its ratio to the uncompressed texture's of the same threads and
 //! memory, and the PSNR of premultiplied colour and opacity. `fresh` allocates its result, `reused` writes over an old
-//! one, `staged` does that and copies it, on one thread, to a buffer written before, as for an upload.
+//! one, `staged` does that and copies it, on one thread, to a buffer written before: ready for an upload.
 
 #![expect(clippy::print_stdout, reason = "the figures are its output")]
 #![expect(clippy::panic, clippy::unwrap_used, reason = "a benchmark may fail loudly")]
@@ -51,6 +51,17 @@ const MUSCLE: [[f64; 5]; 7] = [
     [180.0, 0.82, 0.52, 0.40, 0.60],
     [500.0, 0.95, 0.88, 0.74, 0.85],
     [3071.0, 1.0, 1.0, 1.0, 0.95],
+];
+/// The built-in case's own: the surface of bone, and a little of its inside.
+const HIP: [[f64; 5]; 8] = [
+    [-1024.0, 0.6, 0.4, 0.25, 0.0],
+    [290.0, 0.8, 0.58, 0.4, 0.0],
+    [420.0, 0.95, 0.81, 0.61, 0.22],
+    [800.0, 1.0, 0.95, 0.84, 0.22],
+    [1050.0, 1.0, 0.98, 0.92, 0.045],
+    [1700.0, 1.0, 1.0, 0.98, 0.045],
+    [2400.0, 1.0, 1.0, 1.0, 0.3],
+    [3071.0, 1.0, 1.0, 1.0, 0.3],
 ];
 
 /// Samples of a file, as they are stored.
@@ -137,7 +148,9 @@ fn main() {
     let files: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with('-')).collect();
     let volumes = if files.is_empty() { vec![phantom()] } else { files.iter().map(|f| read(f)).collect() };
     for (name, extent, stored) in &volumes {
-        for (function, points) in [("bone", &BONE[..]), ("soft", &SOFT[..]), ("muscle", &MUSCLE[..])] {
+        for (function, points) in
+            [("bone", &BONE[..]), ("soft", &SOFT[..]), ("muscle", &MUSCLE[..]), ("hip", &HIP[..])]
+        {
             let volume = Volume::new(stored.samples(), *extent).unwrap();
             let begin = Instant::now();
             let table = black_box(table(points, volume.kind()));

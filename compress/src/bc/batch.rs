@@ -137,7 +137,9 @@ pub(super) fn strips<const VOXELS: usize, const BLOCKS: usize>(
     for (i, out) in out.chunks_mut(BLOCKS).enumerate() {
         let rest = rows.map(|row| &row[i * VOXELS..]);
         // The rows of the next blocks follow these.
-        rest.iter().for_each(|rest| fetch_ahead(rest, EDGE * rows[0].len()));
+        for rest in rest {
+            fetch_ahead(rest, EDGE * rows[0].len());
+        }
         if let ([Some(a), Some(b), Some(c), Some(d)], Some(out)) =
             (rest.map(|row| row.first_chunk()), out.first_chunk_mut())
         {

@@ -159,7 +159,7 @@ mod plain {
             colour |= u32::from(INDICES_2[thirds]) << (2 * i);
             let down = scales.top[l].saturating_sub(place as u16).min(scales.span[l]);
             let down = u32::from(down.wrapping_mul(scales.unit[l]));
-            let sevenths = ((down * u32::from(scales.factor[l])) >> 16) + 0x800 >> 12;
+            let sevenths = (((down * u32::from(scales.factor[l])) >> 16) + 0x800) >> 12;
             opacity |= u64::from(INDICES_3[sevenths as usize & 7]) << (3 * i);
         }
         [[colour & 0xFFFF, (opacity & 0xFF_FFFF) as u32], [colour >> 16, (opacity >> 24) as u32]]

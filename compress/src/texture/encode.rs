@@ -87,11 +87,11 @@ impl List {
         Self { blocks: vec![0; blocks + 1], len: 0 }
     }
 
-    /// Adds a block if it is asked for.
+    /// Adds a block if it is asked for: 1, else 0.
     #[inline(always)]
-    fn add(&mut self, block: usize, asked: bool) {
+    fn add(&mut self, block: usize, asked: u32) {
         self.blocks[self.len] = block as u32;
-        self.len += usize::from(asked);
+        self.len += asked as usize;
     }
 
     fn blocks(&self) -> impl Iterator<Item = usize> {
@@ -286,10 +286,12 @@ impl<const BYTES: usize> ColourTask<'_, BYTES> {
             // Without a branch, since which it is is not to be foreseen.
             for i in 0..out.len() {
                 let range = [low[i], high[i]];
-                let listed = (range[0] < from) | (range[1] > to);
-                let on_curve = self.table.is_straight(range) & !self.table.is_constant(range) & self.on_curve;
+                let listed = u32::from(range[0] < from) | u32::from(range[1] > to);
+                let on_curve = u32::from(self.table.is_straight(range))
+                    & u32::from(!self.table.is_constant(range))
+                    & u32::from(self.on_curve);
                 straight.add(group * GROUP + i, listed & on_curve);
-                others.add(group * GROUP + i, listed & !on_curve);
+                others.add(group * GROUP + i, listed & (on_curve ^ 1));
             }
         }
         self.stats.clear += (count - straight.len - others.len) as u64;

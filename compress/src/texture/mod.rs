@@ -429,22 +429,29 @@ mod tests {
         let table = ColourTable::new(&points, SampleKind::I16, 0.0).unwrap();
         let window = Window::new([-500.0, 1000.0], SampleKind::I16, 0.0).unwrap();
         let volume = Volume::new(Samples::I16(&samples), extent).unwrap();
-        let of = |mapping| {
-            let best = Source::new(volume, mapping).unwrap();
-            (Source { simd: Simd::Plain, ..Source::new(volume, mapping).unwrap() }, best)
-        };
-        let (plain, best) = of(Mapping::Colours(&table));
-        for level in [Level::Fast, Level::Best] {
-            let options = EncodeOptions::default().with_level(level);
-            let blocks = |source: &Source<'_>| source.blocks(BlockFormat::Bc3, options).unwrap();
-            assert!(blocks(&plain) == blocks(&best), "BC3 {level:?}");
-        }
-        assert!(plain.texels(TexelFormat::Rgba8) == best.texels(TexelFormat::Rgba8), "texels of colours");
-        let (plain, best) = of(Mapping::Scalars(&window));
-        let blocks = |source: &Source<'_>| source.blocks(BlockFormat::Bc4, EncodeOptions::default()).unwrap();
-        assert!(blocks(&plain) == blocks(&best), "BC4");
-        for format in [TexelFormat::R8, TexelFormat::R16] {
-            assert!(plain.texels(format) == best.texels(format), "{format:?}");
+        let (colours, scalars) = (Mapping::Colours(&table), Mapping::Scalars(&window));
+        let with = |simd, mapping| Source { simd, ..Source::new(volume, mapping).unwrap() };
+        for simd in Simd::all() {
+            let (plain, wide) = (with(Simd::Plain, colours), with(simd, colours));
+            for (format, level) in [
+                (BlockFormat::Bc3, Level::Fast),
+                (BlockFormat::Bc3, Level::Best),
+                (BlockFormat::Bc7, Level::Fast),
+            ] {
+                let options = EncodeOptions::default().with_level(level);
+                let blocks = |source: &Source<'_>| source.blocks(format, options).unwrap();
+                assert!(blocks(&plain) == blocks(&wide), "{format:?} {level:?} {simd:?}");
+            }
+            assert!(plain.texels(TexelFormat::Rgba8) == wide.texels(TexelFormat::Rgba8), "colours {simd:?}");
+            let (plain, wide) = (with(Simd::Plain, scalars), with(simd, scalars));
+            for level in [Level::Fast, Level::Best] {
+                let options = EncodeOptions::default().with_level(level);
+                let blocks = |source: &Source<'_>| source.blocks(BlockFormat::Bc4, options).unwrap();
+                assert!(blocks(&plain) == blocks(&wide), "BC4 {level:?} {simd:?}");
+            }
+            for format in [TexelFormat::R8, TexelFormat::R16] {
+                assert!(plain.texels(format) == wide.texels(format), "{format:?} {simd:?}");
+            }
         }
     }
 }

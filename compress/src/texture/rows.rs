@@ -1,7 +1,7 @@
 //! The four rows of voxels of a row of blocks, as table indices in the first cache.
 
 use super::domain::Domain;
-use super::volume::{Samples, Volume};
+use super::volume::Volume;
 use crate::simd::{Simd, in_each_kind};
 
 /// Voxels of a block along x, and along y.
@@ -22,7 +22,7 @@ pub(super) const WIDE: usize = GROUP * EDGE;
 /// once is half as fast.
 #[derive(Debug)]
 pub(super) struct Rows {
-    groups: Vec<[[u16; WIDE]; EDGE]>,
+    indices: [Vec<[u16; WIDE]>; EDGE],
     ranges: Vec<Ranges>,
 }
 
@@ -41,7 +41,8 @@ impl Rows {
     /// Room for rows of at most `blocks` blocks.
     pub(super) fn new(blocks: usize) -> Self {
         let groups = blocks.div_ceil(GROUP);
-        Self { groups: vec![[[0; WIDE]; EDGE]; groups], ranges: vec![Ranges::default(); groups] }
+        let row = || vec![[0; WIDE]; groups];
+        Self { indices: [row(), row(), row(), row()], ranges: vec![Ranges::default(); groups] }
     }
 
     /// Reads `count` blocks from block `[x, y, z]` of the volume on. Past the volume's edges, and past the blocks in the
@@ -61,24 +62,22 @@ impl Rows {
     fn read_indices(&mut self, volume: &Volume<'_>, domain: &Domain, [x, y, z]: [usize; 3], count: usize) {
         let (extent, first) = (volume.extent(), x * EDGE);
         let inside = (count * EDGE).min(extent.x() - first);
-        let groups = &mut self.groups[..count.div_ceil(GROUP)];
-        for j in 0..EDGE {
+        for (j, row) in self.indices.iter_mut().enumerate() {
+            let row = row[..count.div_ceil(GROUP)].as_flattened_mut();
+            let (row, past) = row.split_at_mut(inside);
             let at = [first, (y * EDGE + j).min(extent.y() - 1), z];
-            match volume.row(at, inside) {
-                Samples::U8(row) => spread(row, groups, j, |samples, out| domain.indices_u8(samples, out)),
-                Samples::I16(row) => spread(row, groups, j, |samples, out| domain.indices_i16(samples, out)),
-                Samples::U16(row) => spread(row, groups, j, |samples, out| domain.indices_u16(samples, out)),
-                Samples::F32(row) => spread(row, groups, j, |samples, out| domain.indices_f32(samples, out)),
-            }
+            volume.indices(domain, at, row);
+            past.fill(row.last().copied().unwrap_or_default());
             // What is read next, while these are encoded.
             volume.fetch_ahead(at, inside, EDGE);
         }
     }
 
     #[inline(always)]
-    fn find_ranges(&mut self, count: usize, of: impl Fn(&[[u16; WIDE]; EDGE]) -> Ranges) {
-        for (group, out) in self.groups.iter().zip(&mut self.ranges).take(count.div_ceil(GROUP)) {
-            *out = of(group);
+    fn find_ranges(&mut self, count: usize, of: impl Fn([&[u16; WIDE]; EDGE]) -> Ranges) {
+        let [a, b, c, d] = &self.indices;
+        for (i, out) in self.ranges.iter_mut().enumerate().take(count.div_ceil(GROUP)) {
+            *out = of([&a[i], &b[i], &c[i], &d[i]]);
         }
     }
 
@@ -98,23 +97,14 @@ impl Rows {
     /// Block `i` of what was read.
     #[inline(always)]
     pub(super) fn block(&self, i: usize) -> Block<'_> {
-        let group = &self.groups[i / GROUP];
-        group.each_ref().map(|row| &row.as_chunks().0[i % GROUP])
-    }
-}
-
-/// Writes the indices of a row of samples as row `j` of the groups; past its end the last is repeated.
-#[inline(always)]
-fn spread<T>(row: &[T], groups: &mut [[[u16; WIDE]; EDGE]], j: usize, indices: impl Fn(&[T], &mut [u16])) {
-    let (whole, rest) = row.as_chunks::<WIDE>();
-    for (samples, group) in whole.iter().zip(&mut *groups) {
-        indices(samples, &mut group[j]);
-    }
-    if let Some(group) = groups.get_mut(whole.len()) {
-        let last = group[j][0];
-        let (row, past) = group[j].split_at_mut(rest.len());
-        indices(rest, row);
-        past.fill(row.last().copied().unwrap_or(last));
+        let [a, b, c, d] = &self.indices;
+        let (group, i) = (i / GROUP, i % GROUP);
+        [
+            &a[group].as_chunks().0[i],
+            &b[group].as_chunks().0[i],
+            &c[group].as_chunks().0[i],
+            &d[group].as_chunks().0[i],
+        ]
     }
 }
 
@@ -131,7 +121,7 @@ in_each_kind! {
 }
 
 /// The ranges of a group.
-fn ranges(rows: &[[u16; WIDE]; EDGE]) -> Ranges {
+fn ranges(rows: [&[u16; WIDE]; EDGE]) -> Ranges {
     let mut ranges = Ranges { low: [u16::MAX; GROUP], high: [0; GROUP], all: [u16::MAX, 0] };
     for row in rows {
         for (i, index) in row.iter().enumerate() {
@@ -148,7 +138,7 @@ fn ranges(rows: &[[u16; WIDE]; EDGE]) -> Ranges {
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]
-fn ranges_avx2(rows: &[[u16; WIDE]; EDGE]) -> Ranges {
+fn ranges_avx2(rows: [&[u16; WIDE]; EDGE]) -> Ranges {
     use std::arch::x86_64::{
         __m256i, _mm_extract_epi16, _mm_minpos_epu16, _mm_packus_epi32, _mm_set1_epi8, _mm_setr_epi8,
         _mm_shuffle_epi8, _mm_xor_si128, _mm256_and_si256, _mm256_castsi256_si128, _mm256_extracti128_si256,
@@ -156,7 +146,8 @@ fn ranges_avx2(rows: &[[u16; WIDE]; EDGE]) -> Ranges {
         _mm256_srli_epi32, _mm256_srli_epi64,
     };
 
-    let [a, b, c, d] = rows.map(|row| bytemuck::cast::<[u16; WIDE], [__m256i; 2]>(row));
+    let row = |j: usize| -> [__m256i; 2] { bytemuck::cast(*rows[j]) };
+    let [a, b, c, d] = [row(0), row(1), row(2), row(3)];
     let (mut least, mut most) = (a, a);
     for i in 0..2 {
         least[i] = _mm256_min_epu16(_mm256_min_epu16(a[i], b[i]), _mm256_min_epu16(c[i], d[i]));
@@ -197,7 +188,7 @@ mod tests {
         };
         for _ in 0..1000 {
             let rows: [[u16; WIDE]; EDGE] = std::array::from_fn(|_| std::array::from_fn(|_| random()));
-            let plain = ranges(&rows);
+            let plain = ranges(rows.each_ref());
             for i in 0..GROUP {
                 let block = rows.iter().flat_map(|row| &row[i * EDGE..][..EDGE]);
                 assert_eq!(Some(&plain.low[i]), block.clone().min(), "least of block {i}");
@@ -207,7 +198,7 @@ mod tests {
             if Simd::best() != Simd::Plain {
                 // SAFETY: AVX2 was detected.
                 #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-                let ranges = unsafe { ranges_avx2(&rows) };
+                let ranges = unsafe { ranges_avx2(rows.each_ref()) };
                 assert_eq!(ranges, plain, "{rows:?}");
             }
         }

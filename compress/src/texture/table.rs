@@ -328,10 +328,10 @@ impl ColourTable {
             (points.partition_point(|point| point.value <= value), self.texels[index][3] == 0)
         };
         let mut stretch = 0_usize;
-        let mut numbers = vec![0; len];
-        for index in 1..len {
-            stretch += usize::from(kind(index) != kind(index - 1));
-            numbers[index] = stretch;
+        let mut numbers = Vec::with_capacity(len);
+        for index in 0..len {
+            stretch += usize::from(index > 0 && kind(index) != kind(index - 1));
+            numbers.push(stretch);
         }
         // Of too many, neighbours count as one.
         let merged = (stretch + 1).div_ceil(STRETCHES);

@@ -52,7 +52,9 @@ pub(super) fn row<const BYTES: usize>(
         let [a, b, c, d] = [&a[..count], &b[..count], &c[..count], &d[..count]];
         for line in (0..count).step_by(LINE_BYTES / size_of::<Four>()) {
             // The rows of the next blocks follow these.
-            [a, b, c, d].iter().for_each(|row| fetch_ahead(&row[line..], EDGE * across));
+            for row in [a, b, c, d] {
+                fetch_ahead(&row[line..], EDGE * across);
+            }
         }
         let block = |l: usize| [&a[l], &b[l], &c[l], &d[l]];
         ranges([a, b, c, d], &mut group.ranges);
@@ -209,7 +211,8 @@ impl Group {
                 let [low, high] = [self.ranges.low[l], self.ranges.high[l]]
                     .map(|value| channels(u32::from_le_bytes(value))[c]);
                 // The first of the others falls if the lower half of the sums says so, the second if the upper does.
-                let sums = u32::from_le_bytes(bytemuck::cast(self.sums[l]));
+                let sums: u32 = bytemuck::cast(self.sums[l]);
+                let sums = if cfg!(target_endian = "big") { sums.rotate_left(16) } else { sums };
                 let sum = if c == 0 || c == 1 && self.lead[l] == 0 { sums << 16 } else { sums };
                 let falls = sum >> 31 == 1 && self.lead[l] != c as u32;
                 // In units of 1/256 of a value; then 5 or 6 bits, the nearest.
