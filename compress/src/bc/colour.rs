@@ -17,7 +17,7 @@ const UNSEEN_WEIGHT: i16 = 8;
 /// is, any axis between the two serves as well; the least squares that follow mend the rest.
 const POWER_ROUNDS: usize = 4;
 
-/// Rounds of least squares, where colours count alike and where they count by alpha.
+/// Rounds of least squares, from the diagonal and from the principal axis.
 const REFINEMENTS: [usize; 2] = [1, 2];
 
 /// Half the widest range of a block, in the whole numbers that its principal axis is found in: 16 products fit 16 bits.
@@ -58,9 +58,13 @@ struct Sums {
     products: Reals,
 }
 
-/// The blocks of the first three planes; `WEIGHTED` by alpha, the fourth.
+/// The blocks of the first three planes, from their `PRINCIPAL` axis or the diagonal of their box; `WEIGHTED` by alpha,
+/// the fourth.
 #[inline(always)]
-pub(super) fn encode<const WEIGHTED: bool>(planes: &[Plane; 4], blocks: &mut [Words; LANES]) {
+pub(super) fn encode<const WEIGHTED: bool, const PRINCIPAL: bool>(
+    planes: &[Plane; 4],
+    blocks: &mut [Words; LANES],
+) {
     let [red, green, blue, alpha] = planes;
     let texels = [red, green, blue];
     let (mut low, mut high) = ([[0; LANES]; 3], [[0; LANES]; 3]);
@@ -77,13 +81,13 @@ pub(super) fn encode<const WEIGHTED: bool>(planes: &[Plane; 4], blocks: &mut [Wo
     let mut reals = [[[0.0; LANES]; 3]; 2];
     let mut ends = Ends { packed: [[0; LANES]; 2], values: [[[0; LANES]; 3]; 2] };
     range(texels, &mut low, &mut high);
-    if WEIGHTED {
-        principal(texels, &weights, &low, &high, &moments, &mut reals);
+    if PRINCIPAL {
+        principal::<WEIGHTED>(texels, &weights, &low, &high, &moments, &mut reals);
     } else {
         diagonal(texels, &low, &high, &mut reals);
     }
     quantise(&reals, &mut ends);
-    for _ in 0..REFINEMENTS[usize::from(WEIGHTED)] {
+    for _ in 0..REFINEMENTS[usize::from(PRINCIPAL)] {
         refine::<WEIGHTED>(texels, &weights, &moments, &mut ends);
     }
     pack(texels, &ends, blocks);
@@ -198,7 +202,7 @@ fn diagonal(texels: [&Plane; 3], low: &Channels, high: &Channels, ends: &mut [Re
 
 /// The ends of the stretch of the principal axis that the colours fill.
 #[inline(always)]
-fn principal(
+fn principal<const WEIGHTED: bool>(
     texels: [&Plane; 3],
     weights: &Plane,
     low: &Channels,
@@ -223,9 +227,13 @@ fn principal(
     let mut covariance = [[0.0; LANES]; 6];
     let pairs = [[red, red], [red, green], [red, blue], [green, green], [green, blue], [blue, blue]];
     for (covariance, [a, b]) in covariance.iter_mut().zip(pairs) {
-        let mut weighted = [[0; LANES]; TEXELS];
-        products(weights, a, &mut weighted);
-        weighted_sum::<true>(&weighted, b, covariance);
+        if WEIGHTED {
+            let mut weighted = [[0; LANES]; TEXELS];
+            products(weights, a, &mut weighted);
+            weighted_sum::<true>(&weighted, b, covariance);
+        } else {
+            weighted_sum::<false>(a, b, covariance);
+        }
     }
     let mut axis = [[0_i16; LANES]; 3];
     principal_axis(&covariance, &mut axis);

@@ -265,10 +265,11 @@ impl Batch {
             (false, _) => {}
         }
         ahead.fetch();
-        if with_alpha && weighted {
-            weighted_colours(planes, colours, simd);
-        } else {
-            best_colours(planes, colours, simd);
+        match (with_alpha, weighted) {
+            (true, true) => weighted_colours(planes, colours, simd),
+            (true, false) => diagonal_colours(planes, colours, simd),
+            // What BC1 packs need not follow one curve, as the colours of a transfer function do.
+            (false, _) => principal_colours(planes, colours, simd),
         }
     }
 }
@@ -293,10 +294,16 @@ in_each_kind! {
     fn searched_scalars(plane: &Plane, blocks: &mut [Words; LANES]), scalar::encode(plane, Effort::Searched, blocks)
 }
 in_each_kind! {
-    fn best_colours(planes: &[Plane; 4], blocks: &mut [Words; LANES]), colour::encode::<false>(planes, blocks)
+    fn diagonal_colours(planes: &[Plane; 4], blocks: &mut [Words; LANES]),
+    colour::encode::<false, false>(planes, blocks)
 }
 in_each_kind! {
-    fn weighted_colours(planes: &[Plane; 4], blocks: &mut [Words; LANES]), colour::encode::<true>(planes, blocks)
+    fn principal_colours(planes: &[Plane; 4], blocks: &mut [Words; LANES]),
+    colour::encode::<false, true>(planes, blocks)
+}
+in_each_kind! {
+    fn weighted_colours(planes: &[Plane; 4], blocks: &mut [Words; LANES]),
+    colour::encode::<true, true>(planes, blocks)
 }
 
 /// The blocks of a strip of one channel.
