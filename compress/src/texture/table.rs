@@ -327,10 +327,12 @@ impl ColourTable {
             let value = self.domain.value(index as u16);
             (points.partition_point(|point| point.value <= value), self.texels[index][3] == 0)
         };
-        let mut stretch = 0_usize;
+        let (mut stretch, mut last) = (0_usize, kind(0));
         let mut numbers = Vec::with_capacity(len);
         for index in 0..len {
-            stretch += usize::from(index > 0 && kind(index) != kind(index - 1));
+            let kind = kind(index);
+            stretch += usize::from(kind != last);
+            last = kind;
             numbers.push(stretch);
         }
         // Of too many, neighbours count as one.
