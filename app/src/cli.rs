@@ -67,10 +67,10 @@ pub struct RenderArgs {
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", default_value = "768x768", value_parser = size)]
     pub size: [u32; 2],
-    /// What draws it: the GPU, or the exact reference on the CPU.
-    #[arg(long, value_enum, default_value_t = Backend::Gpu)]
+    /// What draws it: the GPU, the processor, or the exact reference.
+    #[arg(long, value_enum, default_value_t = Backend::Auto)]
     pub backend: Backend,
-    /// How fine the GPU samples a ray.
+    /// How fine a ray is sampled.
     #[arg(long, value_enum, default_value_t = QualityName::Good)]
     pub quality: QualityName,
     /// Print one JSON object of figures.
@@ -81,13 +81,17 @@ pub struct RenderArgs {
 /// What draws a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Backend {
+    /// The GPU; where the machine has none, the processor, unless the case asks for a texture that loses something.
+    Auto,
     /// The wgpu renderer.
     Gpu,
+    /// The processor alone, from the samples as they are.
+    Cpu,
     /// The reference: exact, on all CPU cores.
     Reference,
 }
 
-/// How fine the GPU samples a ray.
+/// How fine a ray is sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum QualityName {
     /// While the hand moves.

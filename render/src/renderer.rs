@@ -77,8 +77,20 @@ pub struct Stats {
     pub off_screen_skipped: u32,
     /// Looks for finished pixels.
     pub saturate_looks: u32,
-    /// Crossings of translucent surfaces.
+    /// Crossings of surfaces: of translucent ones by the GPU, of all by the CPU.
     pub layers: u64,
+    /// By the CPU: tiles of the picture, once for each fragment.
+    pub tiles: u64,
+    /// By the CPU: tiles in which a fragment shows nothing.
+    pub tiles_skipped: u64,
+    /// By the CPU: cells of volumes that rays went through.
+    pub cells: u64,
+    /// By the CPU: pixels that were done before their ray's end.
+    pub pixels_finished: u64,
+    /// By the CPU: volumes made ready for this picture; the others were.
+    pub volumes_prepared: u32,
+    /// By the CPU: transfer functions made ready for this picture; the others were.
+    pub transfers_prepared: u32,
     /// Bands that the picture was drawn in.
     pub bands: u32,
     /// Textures made and sent for this frame; the others were there.

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
+use render::cpu::{CpuRenderer, Instructions, Skips};
 use render::gpu::{Gpu, GpuError};
 use render::image::FloatImage;
 use render::reference;
@@ -74,12 +75,36 @@ pub(crate) fn truth(scene: &Scene) -> FloatImage {
 /// Draws with both and holds the difference under bounds; returns what the GPU did.
 pub(crate) fn agrees(scene: &Scene, what: &str, psnr_db: f64, max: f64) -> Stats {
     let truth = truth(scene);
+    cpu_agrees(scene, &truth, what);
     let Some((picture, stats)) = draw(scene, Quality::Finest) else { return Stats::default() };
     let d = picture.difference(&truth, scene.background).unwrap();
     assert!(d.psnr_db >= psnr_db && d.max <= max, "{what}: {d:?}");
     let lit = truth.pixels.iter().filter(|p| p[3] > 0.1).count();
     assert!(lit > 200, "{what}: only {lit} pixels show anything");
     stats
+}
+
+/// Holds the CPU's picture to the reference, and to itself with other instructions, threads and nothing skipped.
+fn cpu_agrees(scene: &Scene, truth: &FloatImage, what: &str) {
+    let draw = |instructions, skips, quality| {
+        let mut renderer = CpuRenderer::new();
+        renderer.set_instructions(instructions);
+        renderer.set_skips(skips);
+        renderer.render(scene, SIZE, quality, &|_, _| true).unwrap()
+    };
+    let all = Skips::default();
+    let (picture, stats) = draw(Instructions::Best, all, Quality::Finest);
+    let d = picture.difference(truth, scene.background).unwrap();
+    assert!(d.psnr_db >= 66.0 && d.max <= 2.0, "{what}, by the CPU: {d:?}");
+    let fragments: usize = scene.volumes.iter().map(|v| v.pieces.len()).sum();
+    assert_eq!((stats.fragments + stats.fragments_skipped) as usize, fragments, "{what}: all are counted");
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let (plain, _) = one.install(|| draw(Instructions::Plain, all, Quality::Finest));
+    assert!(plain.pixels == picture.pixels, "{what}: other instructions and threads, other bytes");
+    let (good, _) = draw(Instructions::Best, all, Quality::Good);
+    let (whole, _) = draw(Instructions::Best, Skips { empty: false, finished: false }, Quality::Good);
+    let d = good.difference(&whole, scene.background).unwrap();
+    assert!(d.max <= 255.0 / 512.0, "{what}: skipping changed it by {} / 255", d.max);
 }
 
 fn point(value: f64, r: f64, g: f64, b: f64, a: f64) -> ControlPoint {

@@ -65,7 +65,7 @@ impl Field {
         let extent = grid.extent().map(|n| n as i32);
         let mut field = Self { grid: Arc::clone(grid), numbers, extent, bricks, ranges: Vec::new() };
         field.ranges = match field.values() {
-            Values::Short(v) => field.ranges_of(v, |v| f32::from(v)),
+            Values::Short(v) => field.ranges_of(v, f32::from),
             Values::Float(v) => field.ranges_of(v, |v| v),
         };
         field
@@ -178,6 +178,7 @@ impl Values<'_> {
 pub(super) struct Occupancy {
     /// For each brick 0 where it may show something; else how many bricks away, along the axis that is furthest,
     /// the nearest such brick is, up to 255.
+    /// Three more bytes follow, so that any can be read as the first of four.
     pub(super) distance: Vec<u8>,
     /// Boxes of cells, first and end, that together hold all bricks that may show something.
     pub(super) groups: Vec<[[i32; 3]; 2]>,
@@ -197,9 +198,10 @@ impl Occupancy {
                 if transfer.is_clear(a.min(b), a.max(b)) { u8::MAX } else { 0 }
             })
             .collect();
-        let occupied = distance.iter().filter(|&&d| d == 0).count();
+        let occupied = distance.iter().map(|&d| usize::from(d == 0)).sum();
         let groups = groups(&distance, field.bricks);
         spread(&mut distance, field.bricks);
+        distance.extend([0; 3]);
         Self { distance, groups, occupied }
     }
 
@@ -207,7 +209,7 @@ impl Occupancy {
     pub(super) fn full(field: &Field) -> Self {
         let count = field.ranges.len();
         let end = field.bricks.map(|n| n as i32 * EDGE - 1);
-        Self { distance: vec![0; count], groups: vec![[[-1; 3], end]], occupied: count }
+        Self { distance: vec![0; count + 3], groups: vec![[[-1; 3], end]], occupied: count }
     }
 }
 

@@ -18,6 +18,12 @@ impl Light {
     #[inline(always)]
     fn absorb(&mut self, [r, g, b, depth]: [f32; 4]) {
         let (left, weight) = absorbed(depth);
+        self.absorb_by([r, g, b, depth], left, weight);
+    }
+
+    /// The same, with what [`absorbed`] says of the optical depth.
+    #[inline(always)]
+    pub(super) fn absorb_by(&mut self, [r, g, b, _]: [f32; 4], left: f32, weight: f32) {
         let weight = weight * self.through;
         self.color = [self.color[0] + r * weight, self.color[1] + g * weight, self.color[2] + b * weight];
         self.through *= left;
@@ -52,20 +58,22 @@ fn absorbed(t: f32) -> (f32, f32) {
 #[inline(always)]
 fn exp_minus(t: f32) -> f32 {
     let t = t.min(87.0);
-    // 2^-s with s = whole - part, part in 0 to 1.
-    let s = t * std::f32::consts::LOG2_E;
-    let whole = s.ceil();
-    // What the product rounded off matters: t is up to 87.
-    let rest = (whole * std::f32::consts::LN_2 - t) + whole * LN_2_REST;
+    // 2^-whole times exp of what is left, which is at most half of ln 2.
+    let whole = (t * std::f32::consts::LOG2_E).round_ties_even();
+    let rest = (whole * LN_2_HIGH - t) + whole * LN_2_LOW;
     let mut power = 1.0 / 5040.0;
-    for k in [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
+    for k in EXP_TERMS {
         power = power * rest + k;
     }
     power * f32::from_bits(((127 - whole as i32) as u32) << 23)
 }
 
-/// ln 2 less its nearest `f32`.
-const LN_2_REST: f32 = -1.904_654_3e-9;
+/// The series of exp, from its seventh power down, but for the first term.
+pub(super) const EXP_TERMS: [f32; 7] = [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0];
+
+/// ln 2 in two parts, the first of so few digits that its products with whole numbers are exact.
+pub(super) const LN_2_HIGH: f32 = 0.693_359_4;
+pub(super) const LN_2_LOW: f32 = -2.121_944_4e-4;
 
 /// How rays are walked.
 #[derive(Debug, Clone, Copy)]
@@ -114,7 +122,7 @@ pub(super) fn pixel(
     hits: &[Hit],
     lens: [f64; 2],
     ray: &Ray,
-    manner: &Manner,
+    manner: Manner,
     scratch: &mut Scratch,
     work: &mut Work,
 ) -> [f32; 4] {
@@ -179,13 +187,13 @@ pub(super) fn pixel(
 
 /// Equal steps that divide a stretch of zeta.
 #[inline(always)]
-fn parts([from, to]: [f32; 2], ray: &Ray, manner: &Manner) -> u32 {
+fn parts([from, to]: [f32; 2], ray: &Ray, manner: Manner) -> u32 {
     (((to - from) * ray.mm_per_zeta / manner.step_mm).ceil() as u32).max(1)
 }
 
 /// Through one piece.
 #[inline(always)]
-fn march(walker: &mut Walker<'_>, [from, to]: [f32; 2], ray: &Ray, manner: &Manner, light: &mut Light) {
+fn march(walker: &mut Walker<'_>, [from, to]: [f32; 2], ray: &Ray, manner: Manner, light: &mut Light) {
     let mut at = from;
     loop {
         let end = walker.exit.min(to);
@@ -217,7 +225,7 @@ fn march_many(
     walkers: &mut [(u32, Walker<'_>)],
     [from, to]: [f32; 2],
     ray: &Ray,
-    manner: &Manner,
+    manner: Manner,
     light: &mut Light,
 ) {
     let mut at = from;

@@ -17,8 +17,12 @@
 //! The same scene gives the same bytes for any number of threads.
 
 mod field;
+#[cfg(target_arch = "x86_64")]
+mod lanes;
 mod line;
 mod march;
+#[cfg(target_arch = "x86_64")]
+mod packet;
 mod piece;
 mod surfaces;
 mod table;
@@ -33,8 +37,8 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::image::FloatImage;
-use crate::renderer::Quality;
-use crate::scene::{CameraError, Scene};
+use crate::renderer::{Quality, Stats};
+use crate::scene::{CameraError, Scene, TextureFormat, VolumeItem};
 use crate::view::View;
 use crate::volume::{Grid, Transfer};
 use field::{Field, Occupancy};
@@ -69,39 +73,6 @@ pub enum CpuError {
 /// The largest picture: 16 384 × 16 384, 4 GiB.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
-/// What a picture did, skipped and cost.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct CpuStats {
-    /// From the call to the finished picture, ms.
-    pub frame_ms: f64,
-    /// Part of it before the first ray, ms.
-    pub prepare_ms: f64,
-    /// Longest step along a ray, mm.
-    pub step_mm: f64,
-    /// Pieces drawn.
-    pub pieces: u32,
-    /// Pieces left out: their transfer function leaves nothing, or they lie beside the picture.
-    pub pieces_skipped: u32,
-    /// Bricks of the volumes drawn.
-    pub bricks: u64,
-    /// Bricks that the transfer function makes clear.
-    pub bricks_skipped: u64,
-    /// Tiles of the picture, once for each piece.
-    pub tiles: u64,
-    /// Tiles in which a piece shows nothing.
-    pub tiles_skipped: u64,
-    /// Cells of volumes that rays went through.
-    pub cells: u64,
-    /// Crossings of surfaces.
-    pub crossings: u64,
-    /// Pixels that were done before their ray's end.
-    pub pixels_finished: u64,
-    /// Volumes made ready for this picture; the others were.
-    pub volumes_prepared: u32,
-    /// Transfer functions made ready for this picture; the others were.
-    pub transfers_prepared: u32,
-}
-
 /// What may be skipped. All is; for tests and measurements each can be had.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Skips {
@@ -117,6 +88,29 @@ impl Default for Skips {
     }
 }
 
+/// Which instructions are used. All give the same bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Instructions {
+    /// The widest that the machine has: AVX2 on x86-64.
+    #[default]
+    Best,
+    /// What every machine of the architecture has.
+    Plain,
+}
+
+/// Whether the machine has AVX2 and what goes with it.
+fn has_wide() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    {
+        is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
 /// A volume's samples made ready, and what transfer functions make of them.
 #[derive(Debug)]
 struct Kept {
@@ -124,11 +118,22 @@ struct Kept {
     transfers: Vec<(Arc<Transfer>, Occupancy, Table)>,
 }
 
+/// Whether a scene asks for nothing but what this renderer shows: the samples themselves. A texture that loses
+/// something, and a compressed step of a series, are to be seen with their loss.
+pub fn shows(scene: &Scene) -> bool {
+    let is_exact = |item: &VolumeItem| {
+        let exact = matches!(item.texture, TextureFormat::Auto | TextureFormat::R16 | TextureFormat::R32f);
+        exact && item.packed.is_none()
+    };
+    scene.volumes.iter().all(is_exact)
+}
+
 /// Draws scenes. Keeps what it knows of volumes from picture to picture.
 #[derive(Debug, Default)]
 pub struct CpuRenderer {
     kept: Vec<Kept>,
     skips: Skips,
+    instructions: Instructions,
 }
 
 impl CpuRenderer {
@@ -142,6 +147,11 @@ impl CpuRenderer {
         if skips != self.skips {
             (self.skips, self.kept) = (skips, Vec::new());
         }
+    }
+
+    /// Which instructions it uses from now on.
+    pub fn set_instructions(&mut self, instructions: Instructions) {
+        self.instructions = instructions;
     }
 
     /// Draws a picture of `size`, `[width, height]`, on all threads of the current pool: premultiplied, without
@@ -158,7 +168,7 @@ impl CpuRenderer {
         size: [u32; 2],
         quality: Quality,
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
-    ) -> Result<(FloatImage, CpuStats), CpuError> {
+    ) -> Result<(FloatImage, Stats), CpuError> {
         let begin = Instant::now();
         let [width, height] = size;
         let too_large = CpuError::Size { width, height };
@@ -169,7 +179,7 @@ impl CpuRenderer {
         let mut pixels = Vec::new();
         pixels.try_reserve_exact(count as usize).map_err(|_no_memory| too_large)?;
         pixels.resize(count as usize, [0.0_f32; 4]);
-        let mut stats = CpuStats::default();
+        let mut stats = Stats::default();
         let view = View::new(&scene.camera, size)?;
         let ready = self.ready(scene, &mut stats);
         let placed = place(scene, &self.kept, &ready, &view, &mut stats);
@@ -185,11 +195,19 @@ impl CpuRenderer {
             let shown = depths.shown;
             stats.tiles += tiles as u64;
             stats.tiles_skipped += (tiles - shown) as u64;
-            *(if shown > 0 { &mut stats.pieces } else { &mut stats.pieces_skipped }) += 1;
+            *(if shown > 0 { &mut stats.fragments } else { &mut stats.fragments_skipped }) += 1;
         }
         stats.prepare_ms = begin.elapsed().as_secs_f64() * 1e3;
-        let picture =
-            Picture { placed: &placed.pieces, depths: &depths, surfaces: &surfaces, rays, manner, size };
+        let wide = self.instructions == Instructions::Best && has_wide();
+        let picture = Picture {
+            placed: &placed.pieces,
+            depths: &depths,
+            surfaces: &surfaces,
+            rays,
+            manner,
+            size,
+            wide,
+        };
         let counts = [const { AtomicU64::new(0) }; 3];
         let done = AtomicUsize::new(0);
         let (w, bands) = (width as usize, (height as usize).div_ceil(TILE));
@@ -202,7 +220,7 @@ impl CpuRenderer {
             let bands_done = done.fetch_add(1, Ordering::Relaxed) + 1;
             if progress(bands_done, bands) { Ok(()) } else { Err(CpuError::Cancelled) }
         })?;
-        [stats.cells, stats.pixels_finished, stats.crossings] = counts.map(AtomicU64::into_inner);
+        [stats.cells, stats.pixels_finished, stats.layers] = counts.map(AtomicU64::into_inner);
         stats.frame_ms = begin.elapsed().as_secs_f64() * 1e3;
         Ok((FloatImage { width, height, pixels }, stats))
     }
@@ -218,7 +236,7 @@ impl CpuRenderer {
 
     /// Makes ready what is not, lets go of what the scene does not show. For each volume of the scene its place among
     /// the kept and that of its transfer function.
-    fn ready(&mut self, scene: &Scene, stats: &mut CpuStats) -> Vec<[usize; 2]> {
+    fn ready(&mut self, scene: &Scene, stats: &mut Stats) -> Vec<[usize; 2]> {
         let is_same = |a: &Arc<Transfer>, b: &Arc<Transfer>| Arc::ptr_eq(a, b) || a == b;
         self.kept.retain_mut(|kept| {
             let shown = |grid: &Arc<Grid>| Arc::ptr_eq(grid, kept.field.grid());
@@ -252,8 +270,9 @@ impl CpuRenderer {
                 transfers.len() - 1
             });
             let (_, occupancy, _) = &transfers[transfer];
-            stats.bricks += occupancy.distance.len() as u64;
-            stats.bricks_skipped += (occupancy.distance.len() - occupancy.occupied) as u64;
+            let bricks = field.bricks.iter().product::<usize>();
+            stats.bricks += bricks as u64;
+            stats.bricks_skipped += (bricks - occupancy.occupied) as u64;
             ready.push([volume, transfer]);
         }
         ready
@@ -271,7 +290,7 @@ fn place<'a>(
     kept: &'a [Kept],
     ready: &[[usize; 2]],
     view: &View,
-    stats: &mut CpuStats,
+    stats: &mut Stats,
 ) -> PlacedScene<'a> {
     // Zeta counts from the first thing before the eye, so that it keeps its digits.
     let mut near = f64::INFINITY;
@@ -295,7 +314,7 @@ fn place<'a>(
         let Kept { field, transfers } = &kept[*volume];
         let (_, occupancy, table) = &transfers[*transfer];
         if occupancy.occupied == 0 {
-            stats.pieces_skipped += item.pieces.len() as u32;
+            stats.fragments_skipped += item.pieces.len() as u32;
             continue;
         }
         for piece in &item.pieces {
@@ -314,6 +333,8 @@ struct Picture<'a> {
     rays: Rays,
     manner: Manner,
     size: [u32; 2],
+    /// Whether eight rays go at once; only where the machine has the instructions.
+    wide: bool,
 }
 
 impl Picture<'_> {
@@ -321,26 +342,45 @@ impl Picture<'_> {
     /// instructions, and no fused multiply-add, so that all give the same bytes.
     fn band(&self, band: usize, rows: &mut [[f32; 4]], scratch: &mut Scratch) -> (Work, u64) {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("lzcnt")
-        {
+        if self.wide {
             #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-            // SAFETY: they were just detected.
+            // SAFETY: they were detected.
             return unsafe { self.band_avx2(band, rows, scratch) };
         }
-        self.band_plain(band, rows, scratch)
+        self.tiles(band, rows, scratch, &|_, _, _, _, _| false)
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
     fn band_avx2(&self, band: usize, rows: &mut [[f32; 4]], scratch: &mut Scratch) -> (Work, u64) {
-        self.band_plain(band, rows, scratch)
+        self.tiles(band, rows, scratch, &|piece, depths, at, pixels, work| {
+            if !packet::suits(piece) {
+                return false;
+            }
+            let mut lanes = packet::Lanes::default();
+            for (lane, lens) in lanes.lens.iter_mut().enumerate() {
+                *lens = self.rays.lens(at[0] + lane, at[1]);
+                lanes.rays[lane] = self.ray(*lens);
+                [lanes.from[lane], lanes.to[lane]] = piece.stretch(*lens, depths).unwrap_or_default();
+            }
+            let lights = packet::march(piece, &lanes, self.manner, work);
+            for (pixel, light) in pixels.iter_mut().zip(lights) {
+                *pixel = light.pixel();
+            }
+            true
+        })
     }
 
+    /// All tiles of a row. `eight` is asked first for the rays of eight pixels that see nothing but one piece, and says
+    /// whether it drew them.
     #[inline(always)]
-    fn band_plain(&self, band: usize, rows: &mut [[f32; 4]], scratch: &mut Scratch) -> (Work, u64) {
+    fn tiles(
+        &self,
+        band: usize,
+        rows: &mut [[f32; 4]],
+        scratch: &mut Scratch,
+        eight: &impl Fn(&Placed<'_>, [f32; 2], [usize; 2], &mut [[f32; 4]], &mut Work) -> bool,
+    ) -> (Work, u64) {
         let mut work = Work::default();
         let [width, height] = self.size.map(|n| n as usize);
         let crossings = self.surfaces.band(band, &self.rays, width, height);
@@ -353,23 +393,38 @@ impl Picture<'_> {
                     shown.push((piece, range));
                 }
             }
+            if shown.is_empty() && crossings.len() == 0 {
+                continue;
+            }
             for (row, line) in rows.chunks_exact_mut(width).enumerate() {
                 let columns = tile * TILE..((tile + 1) * TILE).min(width);
+                let y = band * TILE + row;
+                if let [(piece, depths)] = shown[..]
+                    && columns.len() == TILE
+                    && columns.clone().all(|x| crossings.of(row * width + x).is_empty())
+                    && eight(piece, depths, [columns.start, y], &mut line[columns.clone()], &mut work)
+                {
+                    continue;
+                }
                 for (x, pixel) in columns.clone().zip(&mut line[columns]) {
                     let hits = crossings.of(row * width + x);
                     if shown.is_empty() && hits.is_empty() {
                         continue;
                     }
-                    let lens = self.rays.lens(x, band * TILE + row);
-                    let mm_per_zeta = self.rays.mm_per_zeta(lens);
-                    let ray = Ray {
-                        mm_per_zeta: mm_per_zeta as f32,
-                        direction: self.rays.direction(lens).map(|d| (d / mm_per_zeta) as f32),
-                    };
-                    *pixel = march::pixel(&shown, hits, lens, &ray, &self.manner, scratch, &mut work);
+                    let lens = self.rays.lens(x, y);
+                    *pixel =
+                        march::pixel(&shown, hits, lens, &self.ray(lens), self.manner, scratch, &mut work);
                 }
             }
         }
         (work, crossings.len() as u64)
+    }
+
+    #[inline(always)]
+    fn ray(&self, lens: [f64; 2]) -> Ray {
+        let mm_per_zeta = self.rays.mm_per_zeta(lens);
+        let [x, y, z] = self.rays.direction(lens);
+        let direction = [(x / mm_per_zeta) as f32, (y / mm_per_zeta) as f32, (z / mm_per_zeta) as f32];
+        Ray { mm_per_zeta: mm_per_zeta as f32, direction }
     }
 }

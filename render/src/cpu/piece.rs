@@ -148,10 +148,14 @@ impl<'a> Placed<'a> {
         }
     }
 
-    /// What is left of `[from, to]` of a ray.
+    /// Whether a ray meets it in one stretch at most.
+    pub(super) fn is_convex(&self) -> bool {
+        self.outside.is_empty()
+    }
+
+    /// What is left of `[from, to]` of a ray by all that leaves one stretch; none where nothing is.
     #[inline(always)]
-    pub(super) fn stretches(&self, lens: [f64; 2], [mut from, mut to]: [f64; 2], into: &mut Stretches) {
-        into.clear();
+    fn hull(&self, lens: [f64; 2], [mut from, mut to]: [f64; 2]) -> Option<[f64; 2]> {
         for plane in &self.planes {
             let [start, growth] = plane.on(lens);
             let crossing = -start / growth;
@@ -160,17 +164,27 @@ impl<'a> Placed<'a> {
             } else if growth < 0.0 {
                 to = to.min(crossing);
             } else if start < 0.0 {
-                return;
+                return None;
             }
         }
         for tube in &self.inside {
             let [a, b] = tube.within(lens);
             (from, to) = (from.max(a), to.min(b));
         }
-        if from >= to {
-            return;
-        }
-        into.push([from, to]);
+        (from < to).then_some([from, to])
+    }
+
+    /// The one stretch of a ray through a convex piece.
+    #[inline(always)]
+    pub(super) fn stretch(&self, lens: [f64; 2], [from, to]: [f32; 2]) -> Option<[f32; 2]> {
+        self.hull(lens, [f64::from(from), f64::from(to)]).map(|[a, b]| [a as f32, b as f32])
+    }
+
+    /// What is left of `[from, to]` of a ray.
+    #[inline(always)]
+    pub(super) fn stretches(&self, lens: [f64; 2], range: [f64; 2], into: &mut Stretches) {
+        into.clear();
+        into.extend(self.hull(lens, range));
         for tube in &self.outside {
             let [a, b] = tube.within(lens);
             if a < b {

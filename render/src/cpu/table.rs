@@ -98,6 +98,12 @@ impl Table {
         (a < self.clear_below && b < self.clear_below) || (a > self.clear_above && b > self.clear_above)
     }
 
+    /// Positions below and above which nothing absorbs.
+    #[inline(always)]
+    pub(super) fn clear_limits(&self) -> [f32; 2] {
+        [self.clear_below, self.clear_above]
+    }
+
     #[inline(always)]
     fn node(&self, position: f32) -> (&Node, f32) {
         let i = (position.max(0.0) as usize).min(self.nodes.len() - 1);
@@ -109,8 +115,8 @@ impl Table {
     pub(super) fn sum(&self, position: f32) -> [f64; 4] {
         let (node, part) = self.node(position);
         let mut sum = node.sum;
-        for c in 0..4 {
-            sum[c] += f64::from(part * (node.from[c] + part * node.half_rise[c]));
+        for (c, sum) in sum.iter_mut().enumerate() {
+            *sum += f64::from(part * (node.from[c] + part * node.half_rise[c]));
         }
         sum
     }
@@ -120,8 +126,8 @@ impl Table {
     fn rate(&self, position: f32) -> [f32; 4] {
         let (node, part) = self.node(position);
         let mut rate = node.from;
-        for c in 0..4 {
-            rate[c] += 2.0 * part * node.half_rise[c];
+        for (rate, half_rise) in rate.iter_mut().zip(node.half_rise) {
+            *rate += 2.0 * part * half_rise;
         }
         rate
     }

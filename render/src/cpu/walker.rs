@@ -7,7 +7,7 @@ use super::field::{EDGE, Values, trilinear};
 use super::piece::Placed;
 
 /// A ray as its walkers know it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Ray {
     /// Length of a mm of zeta.
     pub(super) mm_per_zeta: f32,
@@ -120,6 +120,7 @@ impl<'a> Walker<'a> {
     }
 
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "several arrays run along")]
     fn enter(&mut self) {
         for axis in 0..3 {
             if self.cell[axis] < -1 || self.cell[axis] >= self.extent[axis] {
@@ -160,6 +161,7 @@ impl<'a> Walker<'a> {
     }
 
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "several arrays run along")]
     fn load(&mut self) {
         self.cells += 1;
         let (mut base, mut strides, mut stride) = (0, [0; 3], 1);
@@ -178,8 +180,8 @@ impl<'a> Walker<'a> {
     #[inline(always)]
     fn position_at(&self, zeta: f32) -> f32 {
         let mut part = [0.0_f32; 3];
-        for axis in 0..3 {
-            part[axis] = (self.start[axis] + self.growth[axis] * zeta - self.low[axis]).clamp(0.0, 1.0);
+        for (axis, part) in part.iter_mut().enumerate() {
+            *part = (self.start[axis] + self.growth[axis] * zeta - self.low[axis]).clamp(0.0, 1.0);
         }
         let table = self.piece.volume.table;
         trilinear(&self.corners, part) * table.scale + table.offset
@@ -210,8 +212,8 @@ impl<'a> Walker<'a> {
         if self.piece.lit {
             let middle = 0.5 * (a + b);
             let mut at = [0.0_f32; 3];
-            for axis in 0..3 {
-                at[axis] = self.start[axis] + self.growth[axis] * middle;
+            for (axis, at) in at.iter_mut().enumerate() {
+                *at = self.start[axis] + self.growth[axis] * middle;
             }
             self.piece.light(&mut depth, at, ray.direction);
         }
