@@ -147,6 +147,8 @@ pub(crate) fn volume(texture: TextureFormat) -> VolumeItem {
         shading: Shading::None,
         texture,
         pieces: vec![Piece::whole()],
+        labels: None,
+        mode: Default::default(),
     }
 }
 
