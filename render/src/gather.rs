@@ -161,9 +161,7 @@ impl Gathered {
             if outside > MAX_GAPS {
                 return Err(GpuError::Cylinders { count: outside, limit: MAX_GAPS });
             }
-            let (Some(bounds), Some(proxy)) =
-                (solid.bounds(), Proxy::new(&solid.transformed(&view_from_voxel)))
-            else {
+            let Some(proxy) = Proxy::new(&solid.transformed(&view_from_voxel)) else {
                 self.counts.fragments_empty += 1;
                 continue;
             };
@@ -172,7 +170,8 @@ impl Gathered {
                 textures.step(gpu, step)?
             } else {
                 let notes = &mut self.notes;
-                let plan = Plan::new(&item.grid, &item.transfer, item.texture, bounds, gpu.caps(), notes);
+                // One texture for all fragments, of all that the volume shows: cutting it makes none anew.
+                let plan = Plan::new(&item.grid, &item.transfer, item.texture, [low, high], gpu.caps(), notes);
                 textures.get(gpu, &plan)?
             };
             let kind = match (texture.reading, item.shading) {

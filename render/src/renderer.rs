@@ -23,7 +23,7 @@ pub enum Quality {
     Draft,
     /// One voxel.
     Good,
-    /// A quarter of a voxel.
+    /// An eighth of a voxel.
     Finest,
     /// This many voxels, for measurements; > 0.
     Spacing(f64),
@@ -35,7 +35,7 @@ impl Quality {
         match self {
             Self::Draft => 2.0,
             Self::Good => 1.0,
-            Self::Finest => 0.25,
+            Self::Finest => 0.125,
             Self::Spacing(voxels) => voxels.max(1e-3),
         }
     }

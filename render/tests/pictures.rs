@@ -214,7 +214,7 @@ fn a_plain_volume_in_both_cameras() {
 fn a_lit_volume() {
     let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
     s.volumes[0].shading = Shading::Lit;
-    agrees(&s, "lit", 50.0, 6.0);
+    agrees(&s, "lit", 60.0, 2.0);
 }
 
 #[test]
@@ -251,9 +251,9 @@ fn fragments_that_moved_and_overlap() {
         Affine::translation(Vector::new(-5.0, 1.0, 2.0)),
         turn,
     ]);
-    agrees(&s, "moved fragments", 58.0, 3.0);
+    agrees(&s, "moved fragments", 60.0, 2.0);
     s.camera = parallel();
-    agrees(&s, "moved fragments, parallel", 58.0, 3.0);
+    agrees(&s, "moved fragments, parallel", 60.0, 2.0);
 }
 
 #[test]
@@ -262,14 +262,14 @@ fn cylinders_keep_their_inside_and_their_outside() {
     for side in [Side::Plus, Side::Minus] {
         let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
         s.volumes[0].pieces = vec![Piece { keep: vec![(tube, side)], pose: Affine::identity() }];
-        agrees(&s, "cylinder", 55.0, 4.0);
+        agrees(&s, "cylinder", 60.0, 2.0);
     }
     let whole = scene(vec![volume(TextureFormat::R16)], vec![]);
     let mut both = whole.clone();
     both.volumes[0].pieces = [Side::Plus, Side::Minus]
         .map(|side| Piece { keep: vec![(tube, side)], pose: Affine::identity() })
         .into();
-    agrees(&both, "both sides of a cylinder", 55.0, 4.0);
+    agrees(&both, "both sides of a cylinder", 60.0, 2.0);
 }
 
 #[test]
@@ -281,12 +281,12 @@ fn a_translucent_surface_before_inside_across_and_behind() {
         ("behind", [-20.0, 40.0, -12.0], 14.0),
     ] {
         let mut s = scene(vec![volume(TextureFormat::R16)], vec![block(centre, half, [0.2, 0.6, 1.0], 0.4)]);
-        agrees(&s, what, 60.0, 2.5);
+        agrees(&s, what, 60.0, 2.0);
         s.camera = parallel();
         s.meshes[0].shading = Shading::Lit;
-        agrees(&s, what, 60.0, 2.5);
+        agrees(&s, what, 60.0, 2.0);
         s.meshes[0].opacity = 1.0;
-        agrees(&s, what, 60.0, 2.5);
+        agrees(&s, what, 60.0, 2.0);
     }
 }
 
@@ -305,7 +305,7 @@ fn surfaces_that_cross_each_other_inside_a_cut_volume() {
         Affine::identity(),
         Affine::translation(Vector::new(-3.0, 0.0, 0.0)),
     ]);
-    let stats = agrees(&s, "crossing surfaces", 58.0, 3.0);
+    let stats = agrees(&s, "crossing surfaces", 60.0, 2.0);
     assert!(stats.layers > 0 || stats.draws == 0, "translucent crossings were captured");
     s.volumes.clear();
     let d = agrees(&s, "surfaces alone", 100.0, 0.01);
@@ -329,7 +329,7 @@ fn more_fragments_than_slots_meet() {
             Piece { keep, pose: Affine::identity() }
         })
         .collect();
-    agrees(&s, "ten fragments", 58.0, 3.0);
+    agrees(&s, "ten fragments", 60.0, 2.0);
 }
 
 #[test]
@@ -337,7 +337,7 @@ fn the_eye_may_be_inside_the_volume_or_look_along_up() {
     let mut s = scene(vec![volume(TextureFormat::R16)], vec![block([0.0; 3], 9.0, [0.2, 0.6, 1.0], 0.4)]);
     s.camera.eye = Point::new(6.0, -14.0, 6.0);
     s.camera.projection = Projection::Perspective { fov_rad: 1.2 };
-    agrees(&s, "eye inside", 58.0, 3.0);
+    agrees(&s, "eye inside", 60.0, 2.0);
     s.camera = Camera { eye: Point::new(0.0, 0.0, 90.0), ..perspective() };
     agrees(&s, "up along the view", 60.0, 2.0);
 }
