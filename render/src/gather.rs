@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::gpu::{Gpu, GpuError};
 use crate::passes::slabs::{Kind, MAX_GAPS, Member, Proxy, Spacing, gpu_data};
-use crate::scene::{Scene, Shading, VolumeItem};
+use crate::scene::{Scene, Shading, VolumeItem, VolumeMode};
 use crate::texture::{Plan, Reading, TextureCache, VolumeTexture};
 use crate::transfer::{NODES, ROWS, Table};
 use crate::view::{Form, View};
@@ -119,6 +119,12 @@ impl Gathered {
         if item.pieces.is_empty() {
             return Ok(());
         }
+        if item.mode != VolumeMode::Composite {
+            return Err(GpuError::CpuOnly { what: "a volume as MIP or isosurface" });
+        }
+        if item.labels.is_some() {
+            return Err(GpuError::CpuOnly { what: "a volume with labels" });
+        }
         let (bounds, grid_place, range) = if let Some(step) = &item.packed {
             (Some(step.bounds()), *step.world_from_voxel(), step.range())
         } else {
@@ -171,7 +177,8 @@ impl Gathered {
             } else {
                 let notes = &mut self.notes;
                 // One texture for all fragments, of all that the volume shows: cutting it makes none anew.
-                let plan = Plan::new(&item.grid, &item.transfer, item.texture, [low, high], gpu.caps(), notes);
+                let plan =
+                    Plan::new(&item.grid, &item.transfer, item.texture, [low, high], gpu.caps(), notes);
                 textures.get(gpu, &plan)?
             };
             let kind = match (texture.reading, item.shading) {

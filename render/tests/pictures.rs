@@ -7,7 +7,9 @@ use render::gpu::{Gpu, GpuError};
 use render::image::FloatImage;
 use render::reference;
 use render::renderer::{Quality, Renderer, Stats};
-use render::scene::{Camera, MeshItem, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem};
+use render::scene::{
+    Camera, Labels, MeshItem, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem, VolumeMode,
+};
 use render::volume::{
     Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Side, Transfer, TriangleMesh, Vector, synth,
 };
@@ -310,6 +312,72 @@ fn surfaces_that_cross_each_other_inside_a_cut_volume() {
     s.volumes.clear();
     let d = agrees(&s, "surfaces alone", 100.0, 0.01);
     assert_eq!(d.textures.len(), 0, "no volume, no texture");
+}
+
+/// Holds the CPU alone to the reference: what the passes do not draw.
+fn cpu_alone_agrees(scene: &Scene, what: &str) {
+    let truth = truth(scene);
+    let shown = truth.pixels.iter().filter(|p| p[3] > 0.1).count();
+    assert!(shown > 200, "{what}: only {shown} pixels show anything");
+    cpu_agrees(scene, &truth, what);
+}
+
+#[test]
+fn labels_ride_with_their_fragments() {
+    let extent = [24, 20, 16];
+    // Blocks of two voxels of the volume, shifted by a third of one, in three labels of which one has no colour.
+    let numbers = (0..24 * 20 * 16).map(|i| ((i % 24) / 3 + (i / 24 % 20) / 4 + i / 480 / 2) as u8 % 4);
+    let place = *grid().world_from_voxel()
+        * Affine::from_columns(
+            Vector::x() * 2.0,
+            Vector::y() * 2.0,
+            Vector::z() * 2.0,
+            Point::new(0.3, 0.3, 0.3),
+        )
+        .unwrap();
+    let labels = Grid::new(extent, Samples::U8(numbers.collect()), Rescale::default(), place).unwrap();
+    let colors = [[0.0; 4], [1.0, 0.0, 0.0, 0.5], [0.0, 0.0, 1.0, 1.0], [0.0; 4]];
+    let mut s = scene(vec![volume(TextureFormat::R16)], vec![block([0.0; 3], 9.0, [0.2, 0.6, 1.0], 0.4)]);
+    s.volumes[0].labels =
+        Some(Labels { grid: Arc::new(labels), pose: Affine::identity(), colors: Arc::from(colors) });
+    cpu_alone_agrees(&s, "labels");
+    s.volumes[0].shading = Shading::Lit;
+    s.volumes[0].pieces = pieces(&[
+        Affine::translation(Vector::new(3.0, -2.0, 9.0)),
+        Affine::translation(Vector::new(-5.0, 1.0, 2.0)),
+        Affine::identity(),
+    ]);
+    cpu_alone_agrees(&s, "labels on moved fragments, lit");
+    s.volumes[0].mode = VolumeMode::Isosurface { value: 350.0, opacity: 0.6 };
+    cpu_alone_agrees(&s, "labels on an isosurface");
+}
+
+#[test]
+fn greatest_values_and_isosurfaces() {
+    let mut s =
+        scene(vec![volume(TextureFormat::R16)], vec![block([4.0, -8.0, 2.0], 9.0, [0.2, 0.6, 1.0], 0.4)]);
+    s.volumes[0].mode = VolumeMode::Mip;
+    cpu_alone_agrees(&s, "MIP");
+    s.camera = parallel();
+    s.volumes[0].pieces = pieces(&[
+        Affine::translation(Vector::new(3.0, -2.0, 9.0)),
+        Affine::identity(),
+        Affine::translation(Vector::new(-5.0, 1.0, 2.0)),
+    ]);
+    cpu_alone_agrees(&s, "MIP of fragments, parallel");
+    s.volumes[0].mode = VolumeMode::Isosurface { value: 200.0, opacity: 0.5 };
+    cpu_alone_agrees(&s, "isosurface of fragments, parallel");
+    s.volumes.push(VolumeItem {
+        pose: Affine::translation(Vector::new(9.0, 2.0, -3.0)),
+        ..volume(TextureFormat::R16)
+    });
+    s.camera = perspective();
+    cpu_alone_agrees(&s, "isosurface within a translucent volume");
+    if !has_gpu() {
+        return;
+    }
+    let refused = renderer().render(&s, SIZE, Quality::Good);
+    assert!(matches!(refused, Err(GpuError::CpuOnly { .. })), "the passes say that they cannot: {refused:?}");
 }
 
 #[test]

@@ -72,8 +72,11 @@ fn kind(path: &Path) -> Result<Kind, Failure> {
 
 type Drawn = (FloatImage, Map<String, Value>, String);
 
-/// By the GPU, unless it is none and the processor shows the same.
+/// By the GPU, unless it is none and the processor shows the same, or only the processor can.
 fn by_either(scene: &Scene, args: &RenderArgs) -> Result<Drawn, Failure> {
+    if cpu::alone_shows(scene) {
+        return by_cpu(scene, args);
+    }
     match Gpu::headless() {
         Ok(gpu) if gpu.caps().software && cpu::shows(scene) => by_cpu(scene, args),
         Ok(gpu) => by_gpu(gpu, scene, args),

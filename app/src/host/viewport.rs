@@ -85,7 +85,8 @@ impl Viewport {
     /// # Errors
     /// [`ViewportError`]; the picture is then as it was, or none.
     pub fn draw(&mut self, scene: &Scene, size: [u32; 2], quality: Quality) -> Result<Stats, ViewportError> {
-        let by_processor = self.renderer.gpu().caps().software && cpu::shows(scene);
+        let software = self.renderer.gpu().caps().software;
+        let by_processor = cpu::alone_shows(scene) || (software && cpu::shows(scene));
         let same = by_processor == self.drawn.is_some() && self.size == size;
         let stats = if by_processor {
             let (picture, stats) = self.processor.render(scene, size, quality, &|_, _| true)?;

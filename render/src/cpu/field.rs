@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use crate::scene::VolumeMode;
 use crate::volume::{Grid, Samples, Transfer};
 
 /// Cells along the edge of a brick.
@@ -186,16 +187,22 @@ pub(super) struct Occupancy {
 }
 
 impl Occupancy {
-    pub(super) fn new(field: &Field, transfer: &Transfer) -> Self {
+    /// Of what a transfer function shows in a mode.
+    pub(super) fn new(field: &Field, transfer: &Transfer, mode: VolumeMode) -> Self {
         let rescale = field.grid.rescale();
         let value = |v: f32| rescale.slope * f64::from(v) + rescale.intercept;
+        let is_clear = |low: f64, high: f64| match mode {
+            VolumeMode::Composite => transfer.is_clear(low, high),
+            VolumeMode::Isosurface { value, .. } => high < value || low >= value,
+            VolumeMode::Mip => false,
+        };
         let mut distance: Vec<u8> = field
             .ranges
             .par_iter()
             .with_min_len(4096)
             .map(|r| {
                 let [a, b] = r.map(value);
-                if transfer.is_clear(a.min(b), a.max(b)) { u8::MAX } else { 0 }
+                if is_clear(a.min(b), a.max(b)) { u8::MAX } else { 0 }
             })
             .collect();
         let occupied = distance.iter().map(|&d| usize::from(d == 0)).sum();
@@ -316,7 +323,7 @@ mod tests {
         let field = Field::new(&Arc::new(grid.expect("a grid")));
         let point = |value: f64, a: f64| ControlPoint { value, rgba: [1.0, 1.0, 1.0, a] };
         let transfer = Transfer::new(vec![point(50.0, 0.0), point(100.0, 1.0)], 1.0).expect("a ramp");
-        let occupancy = Occupancy::new(&field, &transfer);
+        let occupancy = Occupancy::new(&field, &transfer, VolumeMode::Composite);
         // Sample 4, 5, 3 is a corner of cells 3 and 4, 4 and 5, 2 and 3.
         for (cell, shows) in [([3, 4, 2], true), ([4, 5, 3], true), ([6, 4, 2], true), ([7, 4, 2], false)] {
             let [x, y, z] = cell.map(|c: usize| (c + 1) / EDGE as usize);

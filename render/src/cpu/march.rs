@@ -1,5 +1,6 @@
 //! Along a pixel's ray: the pieces and surfaces that it meets, front to back.
 
+use super::layered::Layered;
 use super::piece::{Placed, Stretches};
 use super::surfaces::Hit;
 use super::walker::{Ray, Walker};
@@ -96,6 +97,7 @@ pub(super) struct Work {
 pub(super) struct Scratch {
     stretches: Stretches,
     stops: Vec<Stop>,
+    hits: Vec<Hit>,
 }
 
 /// Where something begins, ends, or is crossed.
@@ -119,6 +121,7 @@ pub(super) type Shown<'a> = (&'a Placed<'a>, [f32; 2]);
 #[inline(always)]
 pub(super) fn pixel(
     shown: &[Shown<'_>],
+    layered: &[Layered<'_>],
     hits: &[Hit],
     lens: [f64; 2],
     ray: &Ray,
@@ -127,6 +130,14 @@ pub(super) fn pixel(
     work: &mut Work,
 ) -> [f32; 4] {
     let mut light = Light::START;
+    scratch.hits.clear();
+    if !layered.is_empty() {
+        scratch.hits.extend_from_slice(hits);
+        for volume in layered {
+            volume.hits(lens, ray, &mut scratch.stretches, &mut scratch.hits);
+        }
+    }
+    let hits = if layered.is_empty() { hits } else { &scratch.hits[..] };
     if let ([(piece, depths)], []) = (shown, hits) {
         piece.stretches(lens, [f64::from(depths[0]), f64::from(depths[1])], &mut scratch.stretches);
         for &[from, to] in &scratch.stretches {
@@ -196,7 +207,10 @@ fn parts([from, to]: [f32; 2], ray: &Ray, manner: Manner) -> u32 {
 fn march(walker: &mut Walker<'_>, [from, to]: [f32; 2], ray: &Ray, manner: Manner, light: &mut Light) {
     let mut at = from;
     loop {
-        let end = walker.exit.min(to);
+        let mut end = walker.exit.min(to);
+        if !walker.clear {
+            end = end.min(walker.next_paint(at));
+        }
         if !walker.clear && end > at {
             let count = parts([at, end], ray, manner);
             let length = (end - at) / count as f32;
@@ -212,11 +226,13 @@ fn march(walker: &mut Walker<'_>, [from, to]: [f32; 2], ray: &Ray, manner: Manne
                 before = here;
             }
         }
-        if walker.exit >= to {
+        at = at.max(end);
+        if at >= to {
             return;
         }
-        at = at.max(end);
-        walker.advance();
+        if at >= walker.exit {
+            walker.advance();
+        }
     }
 }
 
@@ -230,7 +246,8 @@ fn march_many(
 ) {
     let mut at = from;
     loop {
-        let end = walkers.iter().map(|(_, w)| w.exit).fold(to, f32::min);
+        let of = |w: &Walker<'_>| if w.clear { w.exit } else { w.exit.min(w.next_paint(at)) };
+        let end = walkers.iter().map(|(_, w)| of(w)).fold(to, f32::min);
         if end > at && walkers.iter().any(|(_, w)| !w.clear) {
             let count = parts([at, end], ray, manner);
             let length = (end - at) / count as f32;

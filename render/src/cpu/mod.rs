@@ -16,13 +16,16 @@
 //!
 //! The same scene gives the same bytes for any number of threads.
 
+mod cubic;
 mod field;
 #[cfg(target_arch = "x86_64")]
 mod lanes;
+mod layered;
 mod line;
 mod march;
 #[cfg(target_arch = "x86_64")]
 mod packet;
+mod painting;
 mod piece;
 mod surfaces;
 mod table;
@@ -38,10 +41,11 @@ use thiserror::Error;
 
 use crate::image::FloatImage;
 use crate::renderer::{Quality, Stats};
-use crate::scene::{CameraError, Scene, TextureFormat, VolumeItem};
+use crate::scene::{CameraError, Scene, TextureFormat, VolumeItem, VolumeMode};
 use crate::view::View;
 use crate::volume::{Grid, Transfer};
 use field::{Field, Occupancy};
+use layered::Layered;
 use line::Rays;
 use march::{Manner, Scratch, Work};
 use piece::{Placed, Prepared};
@@ -115,7 +119,7 @@ fn has_wide() -> bool {
 #[derive(Debug)]
 struct Kept {
     field: Field,
-    transfers: Vec<(Arc<Transfer>, Occupancy, Table)>,
+    transfers: Vec<(Arc<Transfer>, VolumeMode, Occupancy, Table)>,
 }
 
 /// Whether a scene asks for nothing but what this renderer shows: the samples themselves. A texture that loses
@@ -126,6 +130,11 @@ pub fn shows(scene: &Scene) -> bool {
         exact && item.packed.is_none()
     };
     scene.volumes.iter().all(is_exact)
+}
+
+/// Whether only this renderer shows a scene, and not the passes: labels, MIP and isosurfaces.
+pub fn alone_shows(scene: &Scene) -> bool {
+    scene.volumes.iter().any(|item| item.mode != VolumeMode::Composite || item.labels.is_some())
 }
 
 /// Draws scenes. Keeps what it knows of volumes from picture to picture.
@@ -201,6 +210,7 @@ impl CpuRenderer {
         let wide = self.instructions == Instructions::Best && has_wide();
         let picture = Picture {
             placed: &placed.pieces,
+            layered: &placed.layered,
             depths: &depths,
             surfaces: &surfaces,
             rays,
@@ -237,13 +247,15 @@ impl CpuRenderer {
     /// Makes ready what is not, lets go of what the scene does not show. For each volume of the scene its place among
     /// the kept and that of its transfer function.
     fn ready(&mut self, scene: &Scene, stats: &mut Stats) -> Vec<[usize; 2]> {
-        let is_same = |a: &Arc<Transfer>, b: &Arc<Transfer>| Arc::ptr_eq(a, b) || a == b;
+        let is_same = |(transfer, mode, ..): &(Arc<Transfer>, VolumeMode, Occupancy, Table),
+                       item: &VolumeItem| {
+            *mode == item.mode && (Arc::ptr_eq(transfer, &item.transfer) || *transfer == item.transfer)
+        };
         self.kept.retain_mut(|kept| {
             let shown = |grid: &Arc<Grid>| Arc::ptr_eq(grid, kept.field.grid());
-            let items = scene.volumes.iter().filter(|item| shown(&item.grid));
-            let transfers: Vec<&Arc<Transfer>> = items.map(|item| &item.transfer).collect();
-            kept.transfers.retain(|(known, _, _)| transfers.iter().any(|t| is_same(known, t)));
-            !transfers.is_empty()
+            let items: Vec<&VolumeItem> = scene.volumes.iter().filter(|item| shown(&item.grid)).collect();
+            kept.transfers.retain(|known| items.iter().any(|item| is_same(known, item)));
+            !items.is_empty()
         });
         let mut ready = Vec::new();
         for item in &scene.volumes {
@@ -254,22 +266,19 @@ impl CpuRenderer {
                 self.kept.len() - 1
             });
             let Kept { field, transfers } = &mut self.kept[volume];
-            let known = transfers.iter().position(|(t, _, _)| is_same(t, &item.transfer));
+            let known = transfers.iter().position(|t| is_same(t, item));
             let transfer = known.unwrap_or_else(|| {
                 stats.transfers_prepared += 1;
                 let occupancy = if self.skips.empty {
-                    Occupancy::new(field, &item.transfer)
+                    Occupancy::new(field, &item.transfer, item.mode)
                 } else {
                     Occupancy::full(field)
                 };
-                transfers.push((
-                    Arc::clone(&item.transfer),
-                    occupancy,
-                    Table::new(&item.transfer, &item.grid),
-                ));
+                let table = Table::new(&item.transfer, &item.grid);
+                transfers.push((Arc::clone(&item.transfer), item.mode, occupancy, table));
                 transfers.len() - 1
             });
-            let (_, occupancy, _) = &transfers[transfer];
+            let (_, _, occupancy, _) = &transfers[transfer];
             let bricks = field.bricks.iter().product::<usize>();
             stats.bricks += bricks as u64;
             stats.bricks_skipped += (bricks - occupancy.occupied) as u64;
@@ -282,11 +291,12 @@ impl CpuRenderer {
 /// The pieces of a scene before the camera.
 struct PlacedScene<'a> {
     pieces: Vec<Placed<'a>>,
+    layered: Vec<Layered<'a>>,
     rays: Rays,
 }
 
 fn place<'a>(
-    scene: &Scene,
+    scene: &'a Scene,
     kept: &'a [Kept],
     ready: &[[usize; 2]],
     view: &View,
@@ -309,25 +319,36 @@ fn place<'a>(
         }
     }
     let rays = Rays::new(view, if near.is_finite() { near.max(0.0) } else { 0.0 });
-    let mut pieces = Vec::new();
+    let (mut pieces, mut layered) = (Vec::new(), Vec::new());
     for (item, [volume, transfer]) in scene.volumes.iter().zip(ready) {
         let Kept { field, transfers } = &kept[*volume];
-        let (_, occupancy, table) = &transfers[*transfer];
+        let (_, _, occupancy, table) = &transfers[*transfer];
         if occupancy.occupied == 0 {
             stats.fragments_skipped += item.pieces.len() as u32;
             continue;
         }
-        for piece in &item.pieces {
-            let prepared = Prepared { field, occupancy, table };
-            pieces.push(Placed::new(item, piece, prepared, view, &rays));
+        let place = |piece| Placed::new(item, piece, Prepared { field, occupancy, table }, view, &rays);
+        let placed = item.pieces.iter().map(place);
+        if item.mode == VolumeMode::Composite {
+            pieces.extend(placed);
+        } else {
+            stats.fragments += item.pieces.len() as u32;
+            let rescale = item.grid.rescale();
+            layered.push(Layered {
+                mode: item.mode,
+                transfer: &item.transfer,
+                rescale: [rescale.slope, rescale.intercept],
+                pieces: placed.collect(),
+            });
         }
     }
-    PlacedScene { pieces, rays }
+    PlacedScene { pieces, layered, rays }
 }
 
 /// A picture being drawn.
 struct Picture<'a> {
     placed: &'a [Placed<'a>],
+    layered: &'a [Layered<'a>],
     depths: &'a [Depths],
     surfaces: &'a Surfaces,
     rays: Rays,
@@ -393,27 +414,35 @@ impl Picture<'_> {
                     shown.push((piece, range));
                 }
             }
-            if shown.is_empty() && crossings.len() == 0 {
+            if shown.is_empty() && self.layered.is_empty() && crossings.len() == 0 {
                 continue;
             }
             for (row, line) in rows.chunks_exact_mut(width).enumerate() {
                 let columns = tile * TILE..((tile + 1) * TILE).min(width);
                 let y = band * TILE + row;
-                if let [(piece, depths)] = shown[..]
+                if let ([(piece, depths)], []) = (&shown[..], self.layered)
                     && columns.len() == TILE
                     && columns.clone().all(|x| crossings.of(row * width + x).is_empty())
-                    && eight(piece, depths, [columns.start, y], &mut line[columns.clone()], &mut work)
+                    && eight(piece, *depths, [columns.start, y], &mut line[columns.clone()], &mut work)
                 {
                     continue;
                 }
                 for (x, pixel) in columns.clone().zip(&mut line[columns]) {
                     let hits = crossings.of(row * width + x);
-                    if shown.is_empty() && hits.is_empty() {
+                    if shown.is_empty() && self.layered.is_empty() && hits.is_empty() {
                         continue;
                     }
                     let lens = self.rays.lens(x, y);
-                    *pixel =
-                        march::pixel(&shown, hits, lens, &self.ray(lens), self.manner, scratch, &mut work);
+                    *pixel = march::pixel(
+                        &shown,
+                        self.layered,
+                        hits,
+                        lens,
+                        &self.ray(lens),
+                        self.manner,
+                        scratch,
+                        &mut work,
+                    );
                 }
             }
         }

@@ -154,7 +154,7 @@ impl Cells {
 pub(super) fn suits(piece: &Placed<'_>) -> bool {
     let field = piece.volume.field;
     let samples: u64 = field.extent.iter().map(|&n| n as u64).product();
-    field.extent[0] > 1 && samples < 1 << 31 && piece.is_convex()
+    field.extent[0] > 1 && samples < 1 << 31 && piece.is_convex() && piece.painting.is_none()
 }
 
 /// A packet on its way through a piece that [`suits`].

@@ -2,6 +2,7 @@
 
 use super::field::{Field, Occupancy};
 use super::line::{Form, Rays};
+use super::painting::Painting;
 use super::table::Table;
 use crate::scene::{Piece, Shading, VolumeItem, light};
 use crate::view::View;
@@ -39,6 +40,9 @@ pub(super) struct Placed<'a> {
     /// Takes a gradient by voxel steps, positions a voxel, to view space, positions a mm.
     gradient: [[f32; 3]; 3],
     pub(super) lit: bool,
+    pub(super) painting: Option<Painting<'a>>,
+    /// Depth of the near plane behind the eye; mm.
+    pub(super) near_mm: f64,
     pub(super) view_from_voxel: Affine,
     /// Side of a voxel that is shortest; mm.
     pub(super) voxel_mm: f64,
@@ -49,7 +53,7 @@ pub(super) type Stretches = Vec<[f64; 2]>;
 
 impl<'a> Placed<'a> {
     pub(super) fn new(
-        item: &VolumeItem,
+        item: &'a VolumeItem,
         piece: &Piece,
         volume: Prepared<'a>,
         view: &View,
@@ -103,6 +107,8 @@ impl<'a> Placed<'a> {
             outside,
             gradient,
             lit: item.shading == Shading::Lit,
+            painting: item.labels.as_ref().map(|labels| Painting::new(labels, piece, view, rays)),
+            near_mm: rays.near_mm,
             view_from_voxel,
             voxel_mm: view_from_voxel.column_lengths().into_iter().fold(f64::INFINITY, f64::min),
         }
@@ -120,9 +126,9 @@ impl<'a> Placed<'a> {
         ([x[0], y[0], z[0]], [x[1], y[1], z[1]])
     }
 
-    /// Lights the colour of a step, which is weighted with its optical depth, by the gradient at a voxel place: the
-    /// central differences of the scalar.
-    pub(super) fn light(&self, depth: &mut [f32; 4], at: [f32; 3], direction: [f32; 3]) {
+    /// |n·v| of the gradient at a voxel place, the central differences of the scalar; none where it is too flat to
+    /// light.
+    pub(super) fn facing(&self, at: [f32; 3], direction: [f32; 3]) -> Option<f32> {
         let (values, extent) = (self.volume.field.values(), self.volume.field.extent);
         let mut gradient = [0.0_f32; 3];
         for axis in 0..3 {
@@ -137,10 +143,15 @@ impl<'a> Placed<'a> {
         let [x, y, z] = gradient;
         let size = (x * x + y * y + z * z).sqrt();
         if size < self.volume.table.flat || size == 0.0 {
-            return;
+            return None;
         }
         let [dx, dy, dz] = direction;
-        let facing = ((x * dx + y * dy + z * dz) / size).abs().min(1.0);
+        Some(((x * dx + y * dy + z * dz) / size).abs().min(1.0))
+    }
+
+    /// Lights the colour of a step, which is weighted with its optical depth, by the gradient at a voxel place.
+    pub(super) fn light(&self, depth: &mut [f32; 4], at: [f32; 3], direction: [f32; 3]) {
+        let Some(facing) = self.facing(at, direction) else { return };
         let highlight = light::SPECULAR as f32 * facing.powi(light::SHININESS as i32);
         let shade = (light::AMBIENT + light::DIFFUSE * f64::from(facing)) as f32;
         for c in 0..3 {

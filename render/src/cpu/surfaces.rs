@@ -22,6 +22,13 @@ pub(super) struct Hit {
     order: u32,
 }
 
+impl Hit {
+    /// A layer of a volume: at one depth it comes after all triangles.
+    pub(super) fn layer(zeta: f32, color: [f32; 3], opacity: f32) -> Self {
+        Self { zeta, color, opacity, order: u32::MAX }
+    }
+}
+
 /// How a mesh looks.
 #[derive(Debug)]
 struct Look {

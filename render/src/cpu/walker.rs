@@ -4,6 +4,7 @@
 //! straddles a bend, as steps of one length do, and takes as few samples where the ray runs along an axis as it can.
 
 use super::field::{EDGE, Values, trilinear};
+use super::painting::{PaintLine, paint};
 use super::piece::Placed;
 
 /// A ray as its walkers know it.
@@ -43,6 +44,8 @@ pub(super) struct Walker<'a> {
     sum: [f64; 4],
     sum_known: bool,
     position_known: bool,
+    /// The ray in the labels' voxels, where there are any.
+    paint_line: Option<PaintLine>,
     /// Cells sampled.
     pub(super) cells: u32,
 }
@@ -72,6 +75,7 @@ impl<'a> Walker<'a> {
             sum: [0.0; 4],
             sum_known: false,
             position_known: false,
+            paint_line: piece.painting.as_ref().map(|p| p.line(lens)),
             cells: 0,
         };
         for axis in 0..3 {
@@ -176,15 +180,55 @@ impl<'a> Walker<'a> {
         self.corners = self.values.corners(base, strides);
     }
 
-    /// The scalar inside the cell at a zeta; as a table position.
+    pub(super) fn piece(&self) -> &'a Placed<'a> {
+        self.piece
+    }
+
+    /// Least and greatest stored number at the cell's corners.
+    pub(super) fn corner_range(&self) -> [f32; 2] {
+        let first = [self.corners[0]; 2];
+        self.corners.iter().fold(first, |[low, high], &v| [low.min(v), high.max(v)])
+    }
+
+    /// |n·v| of the gradient at a zeta; none where the field is flat.
+    pub(super) fn facing(&self, zeta: f32, ray: &Ray) -> Option<f32> {
+        self.piece.facing(self.place(zeta), ray.direction)
+    }
+
+    /// Voxel coordinates at a zeta.
     #[inline(always)]
-    fn position_at(&self, zeta: f32) -> f32 {
+    fn place(&self, zeta: f32) -> [f32; 3] {
+        let mut at = [0.0_f32; 3];
+        for (axis, at) in at.iter_mut().enumerate() {
+            *at = self.start[axis] + self.growth[axis] * zeta;
+        }
+        at
+    }
+
+    /// The scalar inside the cell at a zeta; as a stored number.
+    #[inline(always)]
+    pub(super) fn number_at(&self, zeta: f32) -> f32 {
         let mut part = [0.0_f32; 3];
         for (axis, part) in part.iter_mut().enumerate() {
             *part = (self.start[axis] + self.growth[axis] * zeta - self.low[axis]).clamp(0.0, 1.0);
         }
+        trilinear(&self.corners, part)
+    }
+
+    /// The same as a table position.
+    #[inline(always)]
+    fn position_at(&self, zeta: f32) -> f32 {
         let table = self.piece.volume.table;
-        trilinear(&self.corners, part) * table.scale + table.offset
+        self.number_at(zeta) * table.scale + table.offset
+    }
+
+    /// The first place after `zeta` where what is painted may change.
+    #[inline(always)]
+    pub(super) fn next_paint(&self, zeta: f32) -> f32 {
+        match (&self.piece.painting, &self.paint_line) {
+            (Some(painting), Some(line)) => painting.next_wall(line, zeta),
+            _ => f32::INFINITY,
+        }
     }
 
     /// Optical depth times colour, and optical depth, from `a`, where the last step ended or the cell begins, to `b`,
@@ -209,13 +253,15 @@ impl<'a> Walker<'a> {
         if depth[3] <= 0.0 {
             return None;
         }
+        let middle = 0.5 * (a + b);
+        if let (Some(painting), Some(line)) = (&self.piece.painting, &self.paint_line)
+            && let Some(over) = painting.color_at(line, middle)
+        {
+            let weight = depth[3];
+            paint(&mut depth, weight, over);
+        }
         if self.piece.lit {
-            let middle = 0.5 * (a + b);
-            let mut at = [0.0_f32; 3];
-            for (axis, at) in at.iter_mut().enumerate() {
-                *at = self.start[axis] + self.growth[axis] * middle;
-            }
-            self.piece.light(&mut depth, at, ray.direction);
+            self.piece.light(&mut depth, self.place(middle), ray.direction);
         }
         Some(depth)
     }
