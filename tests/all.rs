@@ -5,5 +5,6 @@ mod bad_files;
 mod headless;
 mod layering;
 mod loading;
+mod stress;
 mod support;
 mod window;

@@ -234,6 +234,9 @@ pub struct BenchArgs {
     /// For series and play: voxels along each axis for one of the data's, by interpolation.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
     pub enlarge: u8,
+    /// For pareto: a command that draws the case in turn with ours, such as "python3 tests/peers/vtk/volume.py".
+    #[arg(long, value_name = "COMMAND")]
+    pub peer: Option<String>,
 }
 
 /// A benchmark.
@@ -247,6 +250,10 @@ pub enum BenchName {
     Series,
     /// Volumes a second from a file that is in no cache, compressed and not.
     Play,
+    /// Observed order of error as spacing, grid and pixels are refined, on scenes of known pictures.
+    Accuracy,
+    /// Frame time against error over spacings, textures and renderers, with a peer's beside ours.
+    Pareto,
 }
 
 /// Arguments of `demo`.

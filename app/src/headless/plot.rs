@@ -9,6 +9,15 @@ pub struct Series {
     pub points: Vec<(f64, f64, String)>,
 }
 
+/// How an axis is divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// From 0, in equal parts.
+    Linear,
+    /// In powers of ten.
+    Log,
+}
+
 /// A chart of run time against error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
@@ -16,8 +25,12 @@ pub struct Chart {
     pub title: String,
     /// Under the horizontal axis, with its unit; the axis is logarithmic.
     pub x: String,
-    /// Beside the vertical axis, with its unit; the axis is linear from 0.
+    /// Beside the vertical axis, with its unit.
     pub y: String,
+    /// Of the vertical axis.
+    pub y_scale: Scale,
+    /// Whether lines go from point to point of a series, in their order.
+    pub joined: bool,
     /// What is drawn.
     pub series: Vec<Series>,
 }
@@ -32,18 +45,23 @@ const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00
 impl Chart {
     /// The SVG document.
     pub fn svg(&self) -> String {
-        let finite = |p: &&(f64, f64, String)| p.0 > 0.0 && p.0.is_finite() && p.1.is_finite();
+        let log = self.y_scale == Scale::Log;
+        let finite =
+            |p: &&(f64, f64, String)| p.0 > 0.0 && p.0.is_finite() && p.1.is_finite() && (p.1 > 0.0 || !log);
         let all: Vec<&(f64, f64, String)> =
             self.series.iter().flat_map(|s| &s.points).filter(finite).collect();
-        let powers = all.iter().map(|p| p.0.log10());
-        let low = powers.clone().fold(f64::INFINITY, f64::min).floor();
-        let high = powers.fold(f64::NEG_INFINITY, f64::max).ceil();
-        // Without points there is a decade all the same, and with one value the one above it.
-        let [low, high] = if low > high { [0.0, 1.0] } else { [low, high.max(low + 1.0)] };
-        let top = all.iter().map(|p| p.1).fold(1.0, f64::max) * 1.08;
+        let [low, high] = decades(all.iter().map(|p| p.0));
+        let heights = if log {
+            decades(all.iter().map(|p| p.1))
+        } else {
+            [0.0, all.iter().map(|p| p.1).fold(1.0, f64::max) * 1.08]
+        };
         let [left, upper, right, lower] = FRAME;
         let x = |v: f64| left + (v.log10() - low) / (high - low) * (right - left);
-        let y = |v: f64| lower - v / top * (lower - upper);
+        let y = |v: f64| {
+            let v = if log { v.log10() } else { v };
+            lower - (v - heights[0]) / (heights[1] - heights[0]) * (lower - upper)
+        };
 
         let mut lines = vec![
             format!(
@@ -64,15 +82,28 @@ impl Chart {
             let value = 10.0_f64.powi(power);
             lines.push(text([x(value), lower + 18.0], "middle", &value.to_string()));
         }
-        for tick in 0..=4 {
-            let value = top * f64::from(tick) / 4.0;
-            lines.push(text([left - 6.0, y(value) + 4.0], "end", &format!("{value:.1}")));
+        if log {
+            for power in heights[0] as i32..=heights[1] as i32 {
+                let value = 10.0_f64.powi(power);
+                lines.push(text([left - 6.0, y(value) + 4.0], "end", &format!("{value:e}")));
+            }
+        } else {
+            for tick in 0..=4 {
+                let value = heights[1] * f64::from(tick) / 4.0;
+                lines.push(text([left - 6.0, y(value) + 4.0], "end", &format!("{value:.1}")));
+            }
         }
         for (i, series) in self.series.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
             let row = upper + 10.0 + 20.0 * i as f64;
             lines.push(dot([right + 18.0, row], colour));
             lines.push(text([right + 28.0, row + 4.0], "start", &series.name));
+            if self.joined {
+                let points = series.points.iter().filter(finite);
+                let path: Vec<String> = points.map(|p| format!("{:.1},{:.1}", x(p.0), y(p.1))).collect();
+                let path = path.join(" ");
+                lines.push(format!("<polyline points=\"{path}\" fill=\"none\" stroke=\"{colour}\"/>"));
+            }
             for (px, py, label) in series.points.iter().filter(finite) {
                 lines.push(dot([x(*px), y(*py)], colour));
                 lines.push(text([x(*px) + 7.0, y(*py) - 5.0], "start", label));
@@ -81,6 +112,14 @@ impl Chart {
         lines.push("</svg>\n".to_owned());
         lines.join("\n")
     }
+}
+
+/// Powers of ten that hold all values, at least one decade: without values there is one all the same.
+fn decades(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
+    let powers = values.map(f64::log10);
+    let low = powers.clone().fold(f64::INFINITY, f64::min).floor();
+    let high = powers.fold(f64::NEG_INFINITY, f64::max).ceil();
+    if low > high { [0.0, 1.0] } else { [low, high.max(low + 1.0)] }
 }
 
 fn dot([x, y]: [f64; 2], colour: &str) -> String {
@@ -100,8 +139,13 @@ mod tests {
     use super::*;
 
     fn chart(points: Vec<(f64, f64, String)>) -> String {
+        scaled(points, Scale::Linear)
+    }
+
+    fn scaled(points: Vec<(f64, f64, String)>, y_scale: Scale) -> String {
         let series = vec![Series { name: "a < b".to_owned(), points }];
-        Chart { title: "t".to_owned(), x: "ms".to_owned(), y: "dB".to_owned(), series }.svg()
+        let (title, x, y) = ("t".to_owned(), "ms".to_owned(), "dB".to_owned());
+        Chart { title, x, y, y_scale, joined: y_scale == Scale::Log, series }.svg()
     }
 
     #[test]
@@ -117,6 +161,26 @@ mod tests {
         assert!(dots[1].contains(&format!("cx=\"{left:.1}\" cy=\"{lower:.1}\"")), "{}", dots[1]);
         assert!(dots[2].contains(&format!("cx=\"{right:.1}\"")), "{}", dots[2]);
         assert!(svg.contains("a &lt; b"), "text is escaped");
+    }
+
+    #[test]
+    fn ten_times_as_much_is_a_decade_on_a_logarithmic_axis() {
+        let point = |y: f64| (1.0, y, String::new());
+        let svg = scaled(vec![point(1e-3), point(0.0), point(1e-2), point(1e-1)], Scale::Log);
+        let heights: Vec<f64> = svg
+            .lines()
+            .filter(|l| l.starts_with("<circle"))
+            .skip(1)
+            .map(|l| {
+                l.split("cy=\"")
+                    .nth(1)
+                    .and_then(|t| t.split('"').next())
+                    .and_then(|t| t.parse().ok())
+                    .unwrap_or(0.0)
+            })
+            .collect();
+        assert_eq!(heights, [390.0, 215.0, 40.0], "bottom, middle and top; nought has no logarithm");
+        assert!(svg.contains("<polyline points=\"70.0,390.0 70.0,215.0 70.0,40.0\""), "{svg}");
     }
 
     #[test]

@@ -1,0 +1,84 @@
+//! The renderers that a benchmark measures, as it sees them: a scene and a spacing in, a picture and its time out.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use ::render::gpu::Gpu;
+use ::render::image::FloatImage;
+use ::render::reference;
+use ::render::renderer::{Quality, Renderer};
+use ::render::scene::{Scene, TextureFormat};
+
+use crate::headless::Failure;
+
+/// A picture and what it took.
+#[derive(Debug)]
+pub(super) struct Painted {
+    pub(super) picture: FloatImage,
+    /// From the scene to the finished picture, without reading it back.
+    pub(super) frame_ms: f64,
+}
+
+/// Something that draws scenes.
+pub(super) trait Painter {
+    /// For rows and plots.
+    fn name(&self) -> &'static str;
+
+    /// Whether the spacing matters to it: the reference has none.
+    fn has_spacing(&self) -> bool {
+        true
+    }
+
+    /// The textures worth comparing; one where it reads the samples themselves.
+    fn formats(&self) -> &'static [TextureFormat] {
+        &[TextureFormat::Auto]
+    }
+
+    /// A picture of `size` pixels with sub-steps of `spacing` voxels of the finest volume.
+    fn paint(&mut self, scene: &Scene, size: [u32; 2], spacing: f64) -> Result<Painted, Failure>;
+}
+
+/// Makes a renderer that has drawn nothing yet.
+pub(super) type Maker = fn(&Arc<Gpu>) -> Result<Box<dyn Painter>, Failure>;
+
+/// All there are.
+pub(super) const MAKERS: [Maker; 2] =
+    [|gpu| Ok(Box::new(OnGpu(Renderer::new(Arc::clone(gpu))?))), |_| Ok(Box::new(Exact))];
+
+/// The wgpu renderer.
+struct OnGpu(Renderer);
+
+impl Painter for OnGpu {
+    fn name(&self) -> &'static str {
+        "gpu"
+    }
+
+    fn formats(&self) -> &'static [TextureFormat] {
+        use TextureFormat::{Bc3, Bc4, R16, R32f, Rgba8};
+        &[R16, R32f, Bc4, Rgba8, Bc3]
+    }
+
+    fn paint(&mut self, scene: &Scene, size: [u32; 2], spacing: f64) -> Result<Painted, Failure> {
+        let stats = self.0.render(scene, size, Quality::Spacing(spacing))?;
+        Ok(Painted { picture: self.0.read()?, frame_ms: stats.frame_ms })
+    }
+}
+
+/// The reference, which takes the limit of small steps.
+struct Exact;
+
+impl Painter for Exact {
+    fn name(&self) -> &'static str {
+        "reference"
+    }
+
+    fn has_spacing(&self) -> bool {
+        false
+    }
+
+    fn paint(&mut self, scene: &Scene, size: [u32; 2], _spacing: f64) -> Result<Painted, Failure> {
+        let begin = Instant::now();
+        let picture = reference::draw(scene, size, &reference::Options::default(), &|_, _| true)?;
+        Ok(Painted { picture, frame_ms: begin.elapsed().as_secs_f64() * 1e3 })
+    }
+}
