@@ -254,6 +254,8 @@ pub enum BenchName {
     Accuracy,
     /// Frame time against error over spacings, textures and renderers, with a peer's beside ours.
     Pareto,
+    /// What skipping saves, on data: nothing skipped, a changed transfer function, a moved cut, seven ways to cut.
+    Skips,
 }
 
 /// Arguments of `demo`.

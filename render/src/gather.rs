@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::gpu::{Gpu, GpuError};
+use crate::gpu::{Caps, Gpu, GpuError};
 use crate::passes::slabs::{Kind, MAX_GAPS, Member, Proxy, Spacing, gpu_data};
 use crate::scene::{Scene, Shading, VolumeItem, VolumeMode};
 use crate::texture::{Plan, Reading, TextureCache, VolumeTexture};
@@ -85,10 +85,14 @@ impl Gathered {
         view: &View,
         textures: &mut TextureCache,
         bricks: &mut BrickCache,
+        texture_bytes: u64,
     ) -> Result<Self, GpuError> {
         let mut all = Self::default();
+        // Each volume has an equal share of what all may take.
+        let texture_budget = texture_bytes / (scene.volumes.len() as u64).max(1);
+        let caps = Caps { texture_budget, ..gpu.caps() };
         for item in &scene.volumes {
-            all.add_volume(gpu, item, view, textures, bricks)?;
+            all.add_volume(gpu, caps, item, view, textures, bricks)?;
         }
         textures.forget_unused();
         all.textures_sent = textures.take_sent();
@@ -111,6 +115,7 @@ impl Gathered {
     fn add_volume(
         &mut self,
         gpu: &Gpu,
+        caps: Caps,
         item: &VolumeItem,
         view: &View,
         textures: &mut TextureCache,
@@ -177,8 +182,7 @@ impl Gathered {
             } else {
                 let notes = &mut self.notes;
                 // One texture for all fragments, of all that the volume shows: cutting it makes none anew.
-                let plan =
-                    Plan::new(&item.grid, &item.transfer, item.texture, [low, high], gpu.caps(), notes);
+                let plan = Plan::new(&item.grid, &item.transfer, item.texture, [low, high], caps, notes);
                 textures.get(gpu, &plan)?
             };
             let kind = match (texture.reading, item.shading) {

@@ -32,6 +32,7 @@ mod gather;
 pub mod gpu;
 pub mod image;
 mod passes;
+pub mod recovery;
 pub mod reference;
 pub mod renderer;
 pub mod scene;

@@ -43,6 +43,10 @@ impl Quality {
 
 /// Sub-steps in a slab, unless a stack would have too many slabs.
 const STEPS: u32 = 8;
+/// What all textures may take at first. No interface tells how much memory there is: a small graphics card has it.
+const TEXTURE_BYTES: u64 = 1 << 30;
+/// Below this, memory is not what is short.
+const LEAST_TEXTURE_BYTES: u64 = 1 << 22;
 /// Layers a pixel that room is made for at first.
 const LAYERS_AT_FIRST: u32 = 4;
 
@@ -114,6 +118,8 @@ pub struct Renderer {
     /// The step last sent ahead of its picture.
     sent: Option<Arc<VolumeTexture>>,
     target: Option<Target>,
+    /// What all textures of a picture may take where their format is left to the renderer; bytes.
+    texture_bytes: u64,
 }
 
 impl Renderer {
@@ -139,6 +145,7 @@ impl Renderer {
             bricks: BrickCache::default(),
             sent: None,
             target: None,
+            texture_bytes: TEXTURE_BYTES,
         })
     }
 
@@ -150,6 +157,14 @@ impl Renderer {
     /// What decodes the steps of time series from now on; [`StepDecoder::Auto`] at first.
     pub fn set_step_decoder(&mut self, decoder: StepDecoder) {
         self.textures.set_decoder(decoder);
+    }
+
+    /// What all textures of a picture may take from now on where their format is left to the renderer; bytes. Each
+    /// volume has an equal share: where 16 bits a voxel do not fit there, blocks are taken, and then fewer voxels,
+    /// with a note.
+    pub fn set_texture_bytes(&mut self, bytes: u64) {
+        self.texture_bytes = bytes;
+        self.textures.clear();
     }
 
     /// Takes `new` for `old` from now on, which differs from it only in the voxels from `touched[0]` to before
@@ -178,7 +193,7 @@ impl Renderer {
         self.textures.forget_unused();
         self.sent = Some(self.textures.step(&gpu, step)?);
         // Work begins without waiting for a picture.
-        gpu.queue.submit([]);
+        gpu.submit(None);
         Ok(())
     }
 
@@ -195,16 +210,41 @@ impl Renderer {
         self.target.as_ref().map(|t| &t.display_view)
     }
 
-    /// Draws a scene into a picture of `size` pixels and waits for it.
+    /// Draws a scene into a picture of `size` pixels and waits for it. Where memory runs out, it tries again with half
+    /// of what textures may take, and says so in a note.
     ///
     /// # Errors
     /// [`GpuError`]: a camera that shows nothing, a size the device does not allow, memory, a lost device.
     pub fn render(&mut self, scene: &Scene, size: [u32; 2], quality: Quality) -> Result<Stats, GpuError> {
+        let mut reduced = false;
+        loop {
+            match self.render_once(scene, size, quality) {
+                Err(GpuError::OutOfMemory { .. }) if self.texture_bytes > LEAST_TEXTURE_BYTES => {
+                    self.target = None;
+                    self.set_texture_bytes(self.texture_bytes / 2);
+                    reduced = true;
+                }
+                Ok(mut stats) => {
+                    if reduced {
+                        let mib = self.texture_bytes >> 20;
+                        stats
+                            .notes
+                            .push(format!("the GPU ran out of memory: textures now take {mib} MiB at most"));
+                    }
+                    return Ok(stats);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    fn render_once(&mut self, scene: &Scene, size: [u32; 2], quality: Quality) -> Result<Stats, GpuError> {
         let start = Instant::now();
         let gpu = Arc::clone(&self.gpu);
         self.resize(size)?;
         let view = View::new(&scene.camera, size)?;
-        let gathered = Gathered::new(&gpu, scene, &view, &mut self.textures, &mut self.bricks)?;
+        let gathered =
+            Gathered::new(&gpu, scene, &view, &mut self.textures, &mut self.bricks, self.texture_bytes)?;
         let mut stats = self.stats(&gathered);
         let step_mm = gathered.finest_mm.map(|voxel| voxel * quality.voxels());
         let depth = |side: usize, start: f64, pick: fn(f64, f64) -> f64| {
@@ -246,7 +286,7 @@ impl Renderer {
             };
             let meshes = self.surfaces.prepare(&gpu, &scene.meshes, &view, spacing.near_mm);
             self.surfaces.draw_opaque(&mut encoder, &meshes, target, &whole);
-            gpu.queue.submit([encoder.finish()]);
+            gpu.submit(Some(encoder));
             stats.prepare_ms = start.elapsed().as_secs_f64() * 1e3;
             stats.step_mm = spacing.step_mm;
             stats.steps_per_slab = spacing.steps;
@@ -294,14 +334,14 @@ impl Renderer {
                 let mut encoder =
                     gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
                 stats.saturate_looks += self.slabs.draw(&gpu, &mut encoder, &ready, target, &bound, rows);
-                gpu.queue.submit([encoder.finish()]);
+                gpu.submit(Some(encoder));
                 stats.draws += stack.draws.len() as u32;
                 stats.bands += 1;
             }
             encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         }
         self.present.draw(&gpu, &mut encoder, &whole, &target.picture_view, &target.display_view);
-        gpu.queue.submit([encoder.finish()]);
+        gpu.submit(Some(encoder));
         gpu.wait()?;
         stats.frame_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(stats)

@@ -4,7 +4,8 @@ use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
 use render::cpu::{CpuRenderer, Instructions, Skips};
 use render::gpu::{Gpu, GpuError};
-use render::image::FloatImage;
+use render::image::{Difference, FloatImage};
+use render::recovery::RecoveringRenderer;
 use render::reference;
 use render::renderer::{Quality, Renderer, Stats};
 use render::scene::{
@@ -107,6 +108,11 @@ fn cpu_agrees(scene: &Scene, truth: &FloatImage, what: &str) {
     let (whole, _) = draw(Instructions::Best, Skips { empty: false, finished: false }, Quality::Good);
     let d = good.difference(&whole, scene.background).unwrap();
     assert!(d.max <= 255.0 / 512.0, "{what}: skipping changed it by {} / 255", d.max);
+}
+
+fn cpu_difference(scene: &Scene, truth: &FloatImage) -> Difference {
+    let drawn = CpuRenderer::new().render(scene, SIZE, Quality::Finest, &|_, _| true);
+    drawn.unwrap().0.difference(truth, scene.background).unwrap()
 }
 
 fn point(value: f64, r: f64, g: f64, b: f64, a: f64) -> ControlPoint {
@@ -320,6 +326,111 @@ fn cpu_alone_agrees(scene: &Scene, what: &str) {
     let shown = truth.pixels.iter().filter(|p| p[3] > 0.1).count();
     assert!(shown > 200, "{what}: only {shown} pixels show anything");
     cpu_agrees(scene, &truth, what);
+}
+
+#[test]
+fn sixteen_crossing_surfaces_inside_two_overlapping_volumes() {
+    // Thin sheets through each other, so that every ray crosses all of them in an order of its own.
+    let sheet = |i: usize| {
+        let turn = Affine::rotation_about(
+            Point::origin(),
+            Vector::new((i as f64).sin(), (2.0 * i as f64).cos(), 0.3),
+            0.2 + 0.37 * i as f64,
+        );
+        let corners = [[-30.0, -30.0], [30.0, -30.0], [30.0, 30.0], [-30.0, 30.0]];
+        let corners = corners.map(|[x, z]| Point::new(x, i as f64 * 0.9 - 7.0, z));
+        let hue = i as f64 / 15.0;
+        MeshItem {
+            mesh: Arc::new(TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap()),
+            pose: turn,
+            color: [hue, 1.0 - hue, 0.5],
+            opacity: 0.15 + 0.02 * i as f64,
+            shading: Shading::None,
+        }
+    };
+    let mut other = volume(TextureFormat::R16);
+    other.pose = Affine::rotation_about(Point::origin(), Vector::new(1.0, 0.2, 0.1), 1.1);
+    let points = vec![point(-200.0, 0.1, 0.4, 0.9, 0.0), point(600.0, 0.3, 0.9, 1.0, 0.12)];
+    other.transfer = Arc::new(Transfer::new(points, 2.0).unwrap());
+    let s = scene(vec![volume(TextureFormat::R16), other], (0..16).map(sheet).collect());
+    agrees(&s, "sixteen surfaces in two volumes", 60.0, 1.0);
+    assert!(
+        cpu_difference(&s, &truth(&s)).max <= 1.0,
+        "sixteen surfaces in two volumes, by the CPU: {:?}",
+        cpu_difference(&s, &truth(&s))
+    );
+}
+
+#[test]
+fn a_lost_device_costs_no_byte_of_the_picture() {
+    if !has_gpu() {
+        return;
+    }
+    let mut s = scene(
+        vec![volume(TextureFormat::R16)],
+        vec![
+            block([0.0; 3], 11.0, [0.2, 0.6, 1.0], 0.3),
+            block([-9.0, 3.0, -6.0], 7.0, [0.3, 1.0, 0.3], 1.0),
+        ],
+    );
+    let mut next = s.clone();
+    next.camera = parallel();
+    s.volumes[0].shading = Shading::Lit;
+    let size = [24, 20];
+    let mut renderer = RecoveringRenderer::new(Gpu::headless).unwrap();
+    let mut both = || {
+        let (a, _) = renderer.render(&s, size, Quality::Draft).unwrap();
+        let (b, stats) = renderer.render(&next, size, Quality::Draft).unwrap();
+        (a.pixels, b.pixels, renderer.losses(), stats.notes.len(), renderer.gpu().cloned())
+    };
+    let known = both();
+    // Calls of two pictures when nothing is kept yet, and when all is.
+    let calls = |gpu: &Option<Arc<Gpu>>| 100_000 - gpu.as_ref().unwrap().lose_after(0);
+    known.4.as_ref().unwrap().lose_after(100_000);
+    let kept = calls(&both().4);
+    assert!(kept >= 20, "only {kept} calls in two pictures");
+    let mut lost = 0;
+    for point in 1..=100 {
+        let gpu = both().4.unwrap();
+        gpu.lose_after(1 + (point - 1) % kept);
+        let again = both();
+        lost = again.2;
+        assert!(again.0 == known.0 && again.1 == known.1, "other bytes after a loss at call {point}");
+    }
+    assert!(lost >= 100, "only {lost} of 100 devices were lost");
+}
+
+#[test]
+fn textures_keep_to_their_memory_with_a_note() {
+    if !has_gpu() {
+        return;
+    }
+    let s = scene(vec![volume(TextureFormat::Auto)], vec![]);
+    let truth = truth(&s);
+    let mut renderer = Renderer::new(device().unwrap()).unwrap();
+    // 48 x 40 x 32 voxels are 120 KiB in 16 bits.
+    for (bytes, psnr_db) in [(1 << 20, 55.0), (70_000, 50.0), (40_000, 40.0), (6_000, 20.0)] {
+        renderer.set_texture_bytes(bytes);
+        let stats = renderer.render(&s, SIZE, Quality::Finest).unwrap();
+        let taken: u64 = stats.textures.iter().map(|t| t.bytes).sum();
+        assert!(taken <= bytes, "{taken} bytes of {bytes}");
+        assert_eq!(stats.notes.is_empty(), bytes > 1 << 18, "{bytes}: {:?}", stats.notes);
+        let d = renderer.read().unwrap().difference(&truth, s.background).unwrap();
+        assert!(d.psnr_db >= psnr_db, "{bytes} bytes: {d:?}");
+    }
+}
+
+#[test]
+fn cutting_makes_no_texture_anew() {
+    let mut s = scene(vec![volume(TextureFormat::Bc4)], vec![]);
+    let Some((_, whole)) = draw(&s, Quality::Draft) else { return };
+    let bytes = |stats: &Stats| stats.textures.iter().map(|t| t.bytes).sum::<u64>();
+    s.volumes[0].pieces = pieces(&[Affine::translation(Vector::new(0.0, 0.0, 4.0)); 3]);
+    let mut renderer = renderer();
+    renderer.render(&scene(s.volumes.clone(), vec![]), SIZE, Quality::Draft).unwrap();
+    let stats = renderer.render(&s, SIZE, Quality::Draft).unwrap();
+    assert_eq!((bytes(&stats), stats.textures_sent), (bytes(&whole), 0), "the same texture");
+    assert_eq!(stats.textures.len(), 1, "one for all fragments");
 }
 
 #[test]

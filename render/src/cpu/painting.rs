@@ -33,11 +33,20 @@ impl<'a> Painting<'a> {
         PaintLine { start: [x[0], y[0], z[0]], growth: [x[1], y[1], z[1]] }
     }
 
+    /// Red, green, blue and share of the nearest label.
+    pub(super) fn color_at(&self, line: &PaintLine, zeta: f32) -> Option<[f32; 4]> {
+        let at: [f64; 3] = std::array::from_fn(|a| line.start[a] + line.growth[a] * f64::from(zeta));
+        let grid: &Grid = &self.labels.grid;
+        self.labels.color(label_at(grid, &Point::from(at))).map(|c| c.map(|v| v as f32))
+    }
+}
+
+impl PaintLine {
     /// The first place after `zeta` where another label may be the nearest: half way between two samples.
-    pub(super) fn next_wall(&self, line: &PaintLine, zeta: f32) -> f32 {
+    pub(super) fn next_wall(&self, zeta: f32) -> f32 {
         let mut next = f32::INFINITY;
         for axis in 0..3 {
-            let (start, growth) = (line.start[axis] + 0.5, line.growth[axis]);
+            let (start, growth) = (self.start[axis] + 0.5, self.growth[axis]);
             if growth == 0.0 {
                 continue;
             }
@@ -54,13 +63,6 @@ impl<'a> Painting<'a> {
             }
         }
         next
-    }
-
-    /// Red, green, blue and share of the nearest label.
-    pub(super) fn color_at(&self, line: &PaintLine, zeta: f32) -> Option<[f32; 4]> {
-        let at: [f64; 3] = std::array::from_fn(|a| line.start[a] + line.growth[a] * f64::from(zeta));
-        let grid: &Grid = &self.labels.grid;
-        self.labels.color(label_at(grid, &Point::from(at))).map(|c| c.map(|v| v as f32))
     }
 }
 

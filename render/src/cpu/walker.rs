@@ -225,10 +225,7 @@ impl<'a> Walker<'a> {
     /// The first place after `zeta` where what is painted may change.
     #[inline(always)]
     pub(super) fn next_paint(&self, zeta: f32) -> f32 {
-        match (&self.piece.painting, &self.paint_line) {
-            (Some(painting), Some(line)) => painting.next_wall(line, zeta),
-            _ => f32::INFINITY,
-        }
+        self.paint_line.map_or(f32::INFINITY, |line| line.next_wall(zeta))
     }
 
     /// Optical depth times colour, and optical depth, from `a`, where the last step ended or the cell begins, to `b`,

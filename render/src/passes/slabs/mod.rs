@@ -402,6 +402,7 @@ pub(crate) fn upload(
     bytes: &[u8],
     usage: wgpu::BufferUsages,
 ) -> wgpu::Buffer {
+    gpu.count_call();
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size: (bytes.len() as u64).max(256).next_multiple_of(4),
