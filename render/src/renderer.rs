@@ -264,14 +264,9 @@ impl Renderer {
         if let Some(mut spacing) = spacing {
             let mut stack = Stack::new(&gathered.members, &view, &spacing);
             if stack.most_overlapping > SLOTS {
-                // Draws of one slab follow each other there, so a slab is one sub-step: its order is then
-                // wrong by less than that.
+                // A slab's optical depths are added up there by several draws, which take it as one sub-step.
                 spacing = spacing.single_steps();
                 stack = Stack::new(&gathered.members, &view, &spacing);
-                stats.notes.push(format!(
-                    "{} fragments overlap in the picture; beyond {SLOTS} they are mixed slice by slice",
-                    stack.most_overlapping
-                ));
             }
             let frame = frame_data(scene, &view, &spacing);
             whole = bind_frame(&gpu, &self.frame_layout, &frame);

@@ -512,6 +512,26 @@ fn more_fragments_than_slots_meet() {
 }
 
 #[test]
+fn sixteen_volumes_that_overlap_with_surfaces_among_them() {
+    let volumes = (0..16).map(|i| {
+        let hue = f64::from(i) / 15.0;
+        let points = vec![point(-200.0, hue, 1.0 - hue, 0.5, 0.0), point(600.0, hue, 1.0 - hue, 0.9, 0.04)];
+        VolumeItem {
+            pose: Affine::rotation_about(Point::origin(), Vector::new(1.0, 0.2, hue), 0.4 * f64::from(i)),
+            transfer: Arc::new(Transfer::new(points, 2.0).unwrap()),
+            ..volume(TextureFormat::R16)
+        }
+    });
+    let meshes = vec![
+        block([0.0, 0.0, 0.0], 11.0, [0.2, 0.6, 1.0], 0.3),
+        block([5.0, -4.0, 3.0], 9.0, [1.0, 0.2, 0.3], 0.5),
+        block([-9.0, 3.0, -6.0], 7.0, [0.3, 1.0, 0.3], 1.0),
+    ];
+    let stats = agrees(&scene(volumes.collect(), meshes), "sixteen volumes", 60.0, 2.0);
+    assert!(stats.most_overlapping == 16 || stats.draws == 0, "all meet: {stats:?}");
+}
+
+#[test]
 fn the_eye_may_be_inside_the_volume_or_look_along_up() {
     let mut s = scene(vec![volume(TextureFormat::R16)], vec![block([0.0; 3], 9.0, [0.2, 0.6, 1.0], 0.4)]);
     s.camera.eye = Point::new(6.0, -14.0, 6.0);
