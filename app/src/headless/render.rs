@@ -1,15 +1,15 @@
 //! `render`: one picture of a case, by the GPU or by the reference.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 use ::render::TextureSummary;
 use ::render::cpu::{self, CpuRenderer};
 use ::render::gpu::{Gpu, GpuError};
 use ::render::image::FloatImage;
+use ::render::recovery::RecoveringRenderer;
 use ::render::reference;
-use ::render::renderer::{Quality, Renderer, Stats};
+use ::render::renderer::{Quality, Stats};
 use ::render::scene::Scene;
 use serde_json::{Map, Value, json};
 
@@ -108,17 +108,16 @@ fn by_cpu(scene: &Scene, args: &RenderArgs) -> Result<Drawn, Failure> {
 }
 
 fn by_gpu(gpu: Gpu, scene: &Scene, args: &RenderArgs) -> Result<Drawn, Failure> {
-    let gpu = Arc::new(gpu);
-    let mut renderer = Renderer::new(Arc::clone(&gpu))?;
+    let adapter = gpu.adapter().to_owned();
+    let mut renderer = RecoveringRenderer::on(gpu, Gpu::headless)?;
     let quality = quality(args);
-    let stats = renderer.render(scene, args.size, quality)?;
-    let picture = renderer.read()?;
+    let (picture, stats) = renderer.render(scene, args.size, quality)?;
     for note in &stats.notes {
         log::warn!("{note}");
     }
     let mut map = Map::new();
     map.insert("backend".to_owned(), json!("gpu"));
-    map.insert("adapter".to_owned(), json!(gpu.adapter()));
+    map.insert("adapter".to_owned(), json!(adapter));
     map.insert("quality_voxels".to_owned(), json!(quality.voxels()));
     figures(&stats, &mut map);
     let statement = statement(&stats.textures);
