@@ -64,7 +64,11 @@ fn rules() -> Vec<Rule> {
         rule(
             &["render/src/cpu/"],
             &[],
-            all(&[&UI, &GPU, &["compress", "crate::reference", "crate::gpu", "crate::passes", "crate::texture"]]),
+            all(&[
+                &UI,
+                &GPU,
+                &["compress", "crate::reference", "crate::gpu", "crate::passes", "crate::texture"],
+            ]),
         ),
         rule(
             &["app/src/load/"],

@@ -25,6 +25,7 @@ pub mod input;
 mod play;
 pub mod plot;
 pub mod render;
+pub mod section;
 mod series;
 
 /// Why a job was not done: one sentence, and the program's exit code.
