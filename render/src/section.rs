@@ -8,13 +8,16 @@
 //!
 //! No GPU and no window here: what a section shows is what a measurement reads.
 
+mod outline;
+
 use std::sync::Arc;
 
+pub use outline::cutter_outline;
 use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::scene::Piece;
-use crate::volume::{Affine, Cutter, Grid, Point, TriangleMesh, Vector};
+use crate::volume::{Affine, Body, Grid, Point, TriangleMesh, Vector};
 
 /// Most pixels of one section: beyond this a window size is a mistake.
 const MAX_PIXELS: usize = 1 << 26;
@@ -165,25 +168,23 @@ pub struct Layer {
 }
 
 /// What one piece needs per pixel, prepared once.
-struct Prepared<'a> {
-    keep: &'a [(Cutter, crate::volume::Side)],
+struct Prepared {
+    /// The bodies of the cutters, and whether their inside is kept.
+    keep: Vec<(Body, bool)>,
     unmoved_from_world: Affine,
     voxel_from_world: Affine,
 }
 
 impl Layer {
-    fn prepare(&self) -> Vec<Prepared<'_>> {
+    fn prepare(&self) -> Vec<Prepared> {
         let voxel_from_unmoved = (self.pose * *self.grid.world_from_voxel()).inverse();
-        let prepare = |piece: &'_ Piece| {
-            let unmoved_from_world = piece.pose.inverse();
-            let voxel_from_world = voxel_from_unmoved * unmoved_from_world;
-            (unmoved_from_world, voxel_from_world)
-        };
         self.pieces
             .iter()
             .map(|piece| {
-                let (unmoved_from_world, voxel_from_world) = prepare(piece);
-                Prepared { keep: &piece.keep, unmoved_from_world, voxel_from_world }
+                let unmoved_from_world = piece.pose.inverse();
+                let voxel_from_world = voxel_from_unmoved * unmoved_from_world;
+                let keep = piece.keep.iter().map(|(cutter, side)| cutter.solid(*side)).collect();
+                Prepared { keep, unmoved_from_world, voxel_from_world }
             })
             .collect()
     }
@@ -194,12 +195,12 @@ impl Layer {
     }
 }
 
-fn value(grid: &Grid, pieces: &[Prepared<'_>], p: &Point) -> Option<f64> {
+fn value(grid: &Grid, pieces: &[Prepared], p: &Point) -> Option<f64> {
     pieces.iter().rev().find_map(|piece| {
         // The box is the cheaper question, so it comes first.
         let value = grid.sample(&piece.voxel_from_world.point(p))?;
         let unmoved = piece.unmoved_from_world.point(p);
-        piece.keep.iter().all(|(cutter, side)| cutter.side(&unmoved) == *side).then_some(value)
+        piece.keep.iter().all(|(body, inside)| body.holds(&unmoved) == *inside).then_some(value)
     })
 }
 
@@ -268,77 +269,10 @@ pub fn mesh_outline(section: &Section, mesh: &TriangleMesh, pose: &Affine) -> Ve
     mesh.triangles().par_iter().filter_map(crossing).collect()
 }
 
-/// Where a cutter crosses the section's plane within `reach_mm` of the section's centre: polylines in
-/// world mm. Parallel planes give none.
-pub fn cutter_outline(section: &Section, cutter: &Cutter, reach_mm: f64) -> Vec<Vec<Point>> {
-    let forward = section.forward();
-    match cutter {
-        Cutter::Plane { point, normal } => {
-            let Some(normal) = normal.try_normalize(0.0) else { return Vec::new() };
-            let Some(along) = forward.cross(&normal).try_normalize(1e-9) else { return Vec::new() };
-            // The direction in the section's plane that leads straight to the cutter.
-            let towards = along.cross(&forward);
-            let distance = normal.dot(&(point - section.centre)) / normal.dot(&towards);
-            if distance.abs() > reach_mm {
-                return Vec::new();
-            }
-            let nearest = section.centre + towards * distance;
-            let half = (reach_mm * reach_mm - distance * distance).sqrt();
-            vec![vec![nearest - along * half, nearest + along * half]]
-        }
-        Cutter::Cylinder { point, axis, radius_mm } => {
-            let Some(axis) = axis.try_normalize(0.0) else { return Vec::new() };
-            cylinder_outline(section, point, axis, *radius_mm, reach_mm)
-        }
-    }
-}
-
-fn cylinder_outline(
-    section: &Section,
-    point: &Point,
-    axis: Vector,
-    radius_mm: f64,
-    reach_mm: f64,
-) -> Vec<Vec<Point>> {
-    const STEPS: usize = 96;
-    let forward = section.forward();
-    let slope = axis.dot(&forward);
-    // Seen side on to within a tenth of a degree it is two lines, which the ellipse would not reach.
-    if slope.abs() < 2e-3 {
-        let Some(across) = axis.cross(&forward).try_normalize(1e-9) else { return Vec::new() };
-        let off = section.depth_mm(point);
-        if off.abs() > radius_mm {
-            return Vec::new();
-        }
-        let half = (radius_mm * radius_mm - off * off).sqrt();
-        let along = (axis - forward * slope).try_normalize(1e-9).unwrap_or(axis);
-        let middle = point - forward * off;
-        let middle = middle + along * along.dot(&(section.centre - middle));
-        return [-half, half]
-            .map(|side| {
-                let on = middle + across * side;
-                vec![on - along * reach_mm, on + along * reach_mm]
-            })
-            .to_vec();
-    }
-    let mut seed = Vector::zeros();
-    seed[axis.iamin()] = 1.0;
-    let Some(u) = axis.cross(&seed).try_normalize(1e-9) else { return Vec::new() };
-    let v = axis.cross(&u);
-    let ring = (0..=STEPS)
-        .map(|step| {
-            let angle_rad = std::f64::consts::TAU * step as f64 / STEPS as f64;
-            let on = point + (u * angle_rad.cos() + v * angle_rad.sin()) * radius_mm;
-            on - axis * (section.depth_mm(&on) / slope)
-        })
-        .collect();
-    vec![ring]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::volume::{Rescale, Samples, Side};
+    use crate::volume::{Cutter, Rescale, Samples, Side};
 
     /// 9 × 8 × 7 samples of a linear field (so that interpolation has a closed form), turned and moved.
     fn linear_grid() -> (Arc<Grid>, impl Fn(&Point) -> f64) {
@@ -457,33 +391,6 @@ mod tests {
         let pose = Affine::translation(Vector::new(10.0, 0.0, 0.0));
         let length: f64 = mesh_outline(&section, &mesh, &pose).iter().map(|[a, b]| (b - a).norm()).sum();
         assert!((length - 4.0).abs() < 1e-9, "the outline is as long as the square: {length}");
-    }
-
-    #[test]
-    fn cutter_outlines_lie_on_the_cutter_and_in_the_plane() {
-        let section = Section::new(Point::new(1.0, 2.0, 3.0), Vector::x(), -Vector::z(), 0.5, [80, 60])
-            .expect("section");
-        let centre = Point::new(4.0, 5.0, 2.0);
-        let tilted = Vector::new(1.0, 0.7, -0.4);
-        let plane = Cutter::plane(centre, tilted).expect("plane");
-        let lines = cutter_outline(&section, &plane, 100.0);
-        assert_eq!(lines.len(), 1, "one line");
-        for p in lines.iter().flatten() {
-            assert!(tilted.dot(&(p - centre)).abs() < 1e-9, "on the plane: {p}");
-            assert!(section.depth_mm(p).abs() < 1e-9, "in the section: {p}");
-        }
-        for axis in [tilted, Vector::new(1.0, 0.0, 2.0)] {
-            let tube = Cutter::cylinder(centre, axis, 8.0).expect("tube");
-            let lines = cutter_outline(&section, &tube, 100.0);
-            assert!(!lines.is_empty(), "the tube is met");
-            for p in lines.iter().flatten() {
-                let distance = (p - centre).cross(&axis).norm() / axis.norm();
-                assert!((distance - 8.0).abs() < 1e-9, "on the tube: {distance}");
-                assert!(section.depth_mm(p).abs() < 1e-9, "in the section: {p}");
-            }
-        }
-        let parallel = Cutter::plane(centre, Vector::y()).expect("plane");
-        assert!(cutter_outline(&section, &parallel, 100.0).is_empty(), "a parallel plane is not met");
     }
 
     #[test]

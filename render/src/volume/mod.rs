@@ -22,7 +22,7 @@ mod transfer;
 
 pub use bricks::Bricks;
 pub use cells::CellGrid;
-pub use cutter::{Cutter, CutterError, Side};
+pub use cutter::{Body, Cutter, CutterError, Face, Shape, Side};
 pub use grid::{Grid, GridError, Rescale, Samples};
 pub use mesh::{MeshError, TriangleMesh};
 pub use packed::{PackedError, PackedFormat, PackedStep, SharedBytes};
