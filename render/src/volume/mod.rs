@@ -15,6 +15,7 @@ mod cutter;
 mod grid;
 mod mesh;
 mod packed;
+pub mod partition;
 mod series;
 mod space;
 pub mod synth;
