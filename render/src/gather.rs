@@ -9,7 +9,7 @@ use crate::texture::{Plan, Reading, TextureCache, VolumeTexture};
 use crate::transfer::{NODES, ROWS, Table};
 use crate::view::{Form, View};
 use crate::volume::convex::{ConvexSolid, HalfSpace};
-use crate::volume::{Affine, Bricks, Cutter, Grid, Point, Side, Transfer, Vector};
+use crate::volume::{Affine, Body, Bricks, Face, Grid, Point, Transfer, Vector};
 
 /// A fragment with its geometry in view space, before the near plane is known.
 #[derive(Debug)]
@@ -17,16 +17,19 @@ struct Fragment {
     texture: Arc<VolumeTexture>,
     view_from_voxel: Affine,
     planes: Vec<HalfSpace>,
-    cylinders: Vec<Tube>,
+    rounds: Vec<Round>,
+    /// The faces, inwards, of prisms whose outside is kept.
+    blocks: Vec<[HalfSpace; 5]>,
     transfer: Arc<Transfer>,
     table: usize,
 }
 
-/// A cylinder in view space.
+/// A cylinder or ball in view space.
 #[derive(Debug)]
-struct Tube {
+struct Round {
     point: Point,
-    across: [Vector; 2],
+    /// Along these its distance counts; the third of a cylinder has no length.
+    across: [Vector; 3],
     radius_mm: f64,
     outside: bool,
 }
@@ -148,29 +151,36 @@ impl Gathered {
             let view_from_unmoved = view.view_from_world * piece.pose;
             let view_from_voxel = view_from_unmoved * world_from_voxel;
             let mut planes = box_planes(low, high, &view_from_voxel);
-            let mut cylinders = Vec::new();
+            let (mut rounds, mut blocks) = (Vec::new(), Vec::new());
             for (cutter, side) in &piece.keep {
-                match cutter {
-                    Cutter::Plane { point, normal } => {
-                        let inward = if *side == Side::Plus { *normal } else { -*normal };
-                        let half = HalfSpace::new(point, inward);
-                        solid = solid.clipped(&half.transformed(&world_from_voxel.inverse()));
-                        planes.push(unit(half.transformed(&view_from_unmoved)));
+                let (body, inside) = cutter.solid(*side);
+                let behind = |face: &Face| HalfSpace::new(&face.point, -face.normal);
+                let mut keep = |half: HalfSpace| {
+                    solid = solid.clipped(&half.transformed(&world_from_voxel.inverse()));
+                    planes.push(unit(half.transformed(&view_from_unmoved)));
+                };
+                match &body {
+                    Body::HalfSpace(face) if !inside => keep(HalfSpace::new(&face.point, face.normal)),
+                    Body::HalfSpace(face) => keep(behind(face)),
+                    Body::Prism(faces) if inside => faces.iter().for_each(|face| keep(behind(face))),
+                    Body::Prism(faces) => {
+                        blocks.push(faces.map(|face| unit(behind(&face).transformed(&view_from_unmoved))));
                     }
-                    Cutter::Cylinder { point, axis, radius_mm } => {
-                        let axis = view_from_unmoved.vector(axis);
-                        cylinders.push(Tube {
-                            point: view_from_unmoved.point(point),
-                            across: across(&axis),
-                            radius_mm: *radius_mm,
-                            outside: *side == Side::Plus,
-                        });
+                    Body::Cylinder { point, axis, radius_mm } => {
+                        let [u, v] = across(&view_from_unmoved.vector(axis));
+                        let (point, across) = (view_from_unmoved.point(point), [u, v, Vector::zeros()]);
+                        rounds.push(Round { point, across, radius_mm: *radius_mm, outside: !inside });
+                    }
+                    Body::Ball { centre, radius_mm } => {
+                        let point = view_from_unmoved.point(centre);
+                        let across = [Vector::x(), Vector::y(), Vector::z()];
+                        rounds.push(Round { point, across, radius_mm: *radius_mm, outside: !inside });
                     }
                 }
             }
-            let outside = cylinders.iter().filter(|c| c.outside).count();
-            if outside > MAX_GAPS {
-                return Err(GpuError::Cylinders { count: outside, limit: MAX_GAPS });
+            let gaps = blocks.len() + rounds.iter().filter(|r| r.outside).count();
+            if gaps > MAX_GAPS {
+                return Err(GpuError::Gaps { count: gaps, limit: MAX_GAPS });
             }
             let Some(proxy) = Proxy::new(&solid.transformed(&view_from_voxel)) else {
                 self.counts.fragments_empty += 1;
@@ -205,7 +215,15 @@ impl Gathered {
             let index = self.fragments.len() as u32;
             self.members.push(Member { proxy, volume: Some((index, kind, position)) });
             let transfer = Arc::clone(&item.transfer);
-            self.fragments.push(Fragment { texture, view_from_voxel, planes, cylinders, transfer, table });
+            self.fragments.push(Fragment {
+                texture,
+                view_from_voxel,
+                planes,
+                rounds,
+                blocks,
+                transfer,
+                table,
+            });
         }
         Ok(())
     }
@@ -231,26 +249,29 @@ impl Gathered {
         self.known_tables.len() - 1
     }
 
-    /// The fragments, planes and cylinders as the shader reads them, seen from the stack's near plane.
+    /// The fragments, planes and round bodies as the shader reads them, seen from the stack's near plane.
     pub(crate) fn to_gpu(
         &self,
         view: &View,
         spacing: &Spacing,
-    ) -> (Vec<gpu_data::Fragment>, Vec<Form>, Vec<gpu_data::Cylinder>) {
+    ) -> (Vec<gpu_data::Fragment>, Vec<Form>, Vec<gpu_data::Round>) {
         let near = spacing.near_mm;
-        let (mut fragments, mut planes, mut cylinders) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut fragments, mut planes, mut rounds) = (Vec::new(), Vec::new(), Vec::new());
         for fragment in &self.fragments {
             let texture_from_view = fragment.texture.texture_from_voxel * fragment.view_from_voxel.inverse();
             let row = |r| view.row_form(&texture_from_view, r, near);
-            let (plane_first, cylinder_first) = (planes.len() as u32, cylinders.len() as u32);
+            let (plane_first, round_first) = (planes.len() as u32, rounds.len() as u32);
             planes.extend(fragment.planes.iter().map(|p| view.form(p, near)));
-            cylinders.extend(fragment.cylinders.iter().map(|tube| {
-                let form = |normal: Vector| view.form(&HalfSpace::new(&tube.point, normal), near);
-                gpu_data::Cylinder {
-                    u: form(tube.across[0]),
-                    v: form(tube.across[1]),
-                    radius_mm: tube.radius_mm as f32,
-                    outside: u32::from(tube.outside),
+            let block_first = planes.len() as u32;
+            planes.extend(fragment.blocks.iter().flatten().map(|p| view.form(p, near)));
+            rounds.extend(fragment.rounds.iter().map(|round| {
+                let form = |normal: Vector| view.form(&HalfSpace::new(&round.point, normal), near);
+                gpu_data::Round {
+                    u: form(round.across[0]),
+                    v: form(round.across[1]),
+                    w: form(round.across[2]),
+                    radius_mm: round.radius_mm as f32,
+                    outside: u32::from(round.outside),
                     pad_0: 0,
                     pad_1: 0,
                 }
@@ -288,15 +309,19 @@ impl Gathered {
                 table_row: (fragment.table * ROWS) as u32,
                 unit_mm: fragment.transfer.unit_mm() as f32,
                 plane_first,
-                plane_end: planes.len() as u32,
-                cylinder_first,
-                cylinder_end: cylinders.len() as u32,
+                plane_end: block_first,
+                round_first,
+                round_end: rounds.len() as u32,
+                block_first,
+                block_end: planes.len() as u32,
+                pad_0: 0,
+                pad_1: 0,
                 channel,
                 stack,
             });
         }
         debug_assert_eq!(self.tables.len(), self.known_tables.len() * ROWS * NODES, "whole tables");
-        (fragments, planes, cylinders)
+        (fragments, planes, rounds)
     }
 }
 

@@ -270,12 +270,12 @@ impl Renderer {
             }
             let frame = frame_data(scene, &view, &spacing);
             whole = bind_frame(&gpu, &self.frame_layout, &frame);
-            let (fragments, planes, cylinders) = gathered.to_gpu(&view, &spacing);
+            let (fragments, planes, rounds) = gathered.to_gpu(&view, &spacing);
             let inputs = Inputs {
                 stack: &stack,
                 fragments: &fragments,
                 planes: &planes,
-                cylinders: &cylinders,
+                rounds: &rounds,
                 tables: &gathered.tables,
                 textures: &gathered.textures,
             };

@@ -266,18 +266,68 @@ fn fragments_that_moved_and_overlap() {
 
 #[test]
 fn cylinders_keep_their_inside_and_their_outside() {
-    let tube = Cutter::cylinder(Point::new(-2.0, 0.0, 4.0), Vector::new(0.2, 1.0, 0.3), 9.0).unwrap();
+    both_sides("cylinder", tube());
+}
+
+#[test]
+fn domes_keep_their_inside_and_their_outside() {
+    both_sides("dome", dome());
+}
+
+#[test]
+fn blades_keep_what_they_have_passed_and_the_rest() {
+    both_sides("blade", blade());
+}
+
+fn tube() -> Cutter {
+    Cutter::cylinder(Point::new(-2.0, 0.0, 4.0), Vector::new(0.2, 1.0, 0.3), 9.0).unwrap()
+}
+
+fn dome() -> Cutter {
+    Cutter::dome(Point::new(-1.0, -4.0, 4.0), 10.0).unwrap()
+}
+
+fn blade() -> Cutter {
+    let (normal, right) = (Vector::new(0.3, -0.5, 1.0), Vector::new(1.0, 0.2, 0.0));
+    Cutter::blade(Point::new(-2.0, 1.0, 6.0), normal, right, [14.0, 18.0]).unwrap()
+}
+
+/// Each side of a cutter alone, both, and both of one with a kerf that is seen.
+fn both_sides(what: &str, cutter: Cutter) {
+    let piece = |side| Piece { keep: vec![(cutter, side)], pose: Affine::identity() };
+    let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
     for side in [Side::Plus, Side::Minus] {
-        let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
-        s.volumes[0].pieces = vec![Piece { keep: vec![(tube, side)], pose: Affine::identity() }];
-        agrees(&s, "cylinder", 60.0, 2.0);
+        s.volumes[0].pieces = vec![piece(side)];
+        agrees(&s, &format!("{side:?} of a {what}"), 60.0, 2.0);
     }
-    let whole = scene(vec![volume(TextureFormat::R16)], vec![]);
-    let mut both = whole.clone();
-    both.volumes[0].pieces = [Side::Plus, Side::Minus]
-        .map(|side| Piece { keep: vec![(tube, side)], pose: Affine::identity() })
-        .into();
-    agrees(&both, "both sides of a cylinder", 60.0, 2.0);
+    s.volumes[0].pieces = vec![piece(Side::Plus), piece(Side::Minus)];
+    agrees(&s, &format!("both sides of a {what}"), 60.0, 2.0);
+    s.camera = parallel();
+    for piece in &mut s.volumes[0].pieces {
+        piece.keep[0].0 = cutter.with_kerf(3.0).unwrap();
+    }
+    s.volumes[0].pieces[1].pose = Affine::translation(Vector::new(2.0, -3.0, 1.0));
+    agrees(&s, &format!("a {what} with a kerf"), 60.0, 2.0);
+}
+
+#[test]
+fn a_piece_outside_of_many_cutters_that_overlap() {
+    let round = |i: i32| {
+        let at = Point::new(f64::from(i) * 5.0 - 12.0, -3.0, f64::from(i % 2) * 3.0 + 2.0);
+        Cutter::dome(at, 4.5).unwrap()
+    };
+    let mut keep: Vec<_> = [tube(), blade(), dome()].map(|c| (c, Side::Plus)).into();
+    keep.extend((0..5).map(|i| (round(i), Side::Plus)));
+    keep.push((plane([0.0, 0.0, -9.0], [0.2, 0.1, 1.0]).with_kerf(1.5).unwrap(), Side::Plus));
+    let mut s = scene(vec![volume(TextureFormat::R16)], vec![]);
+    s.volumes[0].pieces = vec![Piece { keep: keep.clone(), pose: Affine::identity() }];
+    agrees(&s, "eight gaps", 60.0, 2.0);
+    if has_gpu() {
+        keep.push((round(5), Side::Plus));
+        s.volumes[0].pieces[0].keep = keep;
+        let refused = renderer().render(&s, SIZE, Quality::Good);
+        assert_eq!(refused, Err(GpuError::Gaps { count: 9, limit: 8 }), "nine");
+    }
 }
 
 #[test]
@@ -570,9 +620,7 @@ fn a_scene_far_from_the_origin_gives_the_same_picture() {
     s.volumes[0].pose = shift * s.volumes[0].pose;
     for piece in &mut s.volumes[0].pieces {
         for (cutter, _) in &mut piece.keep {
-            if let Cutter::Plane { point, .. } = cutter {
-                *point += far;
-            }
+            *cutter = cutter.moved(&shift);
         }
     }
     s.meshes[0].pose = shift * s.meshes[0].pose;

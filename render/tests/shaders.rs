@@ -61,7 +61,7 @@ fn every_mirror_has_its_struct_s_layout() {
         assert_eq!(&ours, fields, "fields of {}", mirror.name);
         assert_eq!(mirror.size, *span, "size of {}", mirror.name);
     }
-    assert_eq!(mirrors().len(), 6, "Frame, Form, Fragment, Cylinder, Decode, Surface");
+    assert_eq!(mirrors().len(), 6, "Frame, Form, Fragment, Round, Decode, Surface");
 }
 
 #[test]

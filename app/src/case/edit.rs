@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use render::scene::{Camera, CameraError, Shading, TextureFormat, VolumeMode};
-use render::volume::{Affine, Cutter, CutterError, Point, Side, SpaceError, Transfer};
+use render::volume::{Affine, Cutter, Point, Side, SpaceError, Transfer};
 use thiserror::Error;
 
 use super::labels::{self, LabelChange, LabelSet};
@@ -138,8 +138,19 @@ pub enum Edit {
         /// The corners of the volume's box in its unmoved place, world mm; corner bits are x, y, z.
         corners: [Point; 8],
     },
-    /// Makes one fragment of several of one volume, in the place of the first. Refused where their
-    /// union is not what one set of kept sides can say.
+    /// Divides one fragment by a cutter, meant where the fragment is now, in two that stay there. Where
+    /// the fragment was moved a cutter of its own is added: this one, taken back by its pose. Refused
+    /// where the cutter does not pass through it.
+    SplitFragment {
+        /// The fragment.
+        id: String,
+        /// A cutter's id.
+        cutter: String,
+        /// As for [`Edit::Split`].
+        corners: [Point; 8],
+    },
+    /// Makes one fragment of several of one volume, in the place of the first; what a saw took between
+    /// them comes back. Refused where their union is not what one set of kept sides can say.
     Fuse {
         /// The fragments, two or more; the first gives id and pose.
         ids: Vec<String>,
@@ -288,9 +299,14 @@ pub enum EditError {
         /// What is wrong with it.
         source: SpaceError,
     },
-    /// The cutter is no surface.
-    #[error("{0}")]
-    Cutter(#[from] CutterError),
+    /// Not both sides of the cutter have a part of the fragment.
+    #[error("\"{cutter}\" does not pass through \"{id}\" where it is now; move the cutter there")]
+    Misses {
+        /// The cutter.
+        cutter: String,
+        /// The fragment.
+        id: String,
+    },
     /// The camera shows nothing.
     #[error("{0}")]
     Camera(#[from] CameraError),
@@ -379,7 +395,6 @@ pub fn apply(case: &mut Case, edit: Edit) -> Result<(), EditError> {
         }
         Edit::AddCutter(cutter) => {
             new_id("cutter", &cutter.id, case.cutter(&cutter.id).is_some())?;
-            valid(&cutter.cutter)?;
             case.cutters.push(cutter);
         }
         Edit::RemoveCutter { id } => {
@@ -398,11 +413,9 @@ pub fn apply(case: &mut Case, edit: Edit) -> Result<(), EditError> {
                 }
             }
         }
-        Edit::SetCutter { id, cutter } => {
-            valid(&cutter)?;
-            cutter_mut(case, &id)?.cutter = cutter;
-        }
+        Edit::SetCutter { id, cutter } => cutter_mut(case, &id)?.cutter = cutter,
         Edit::Split { volume, cutters, corners } => split_volume(case, &volume, &cutters, &corners)?,
+        Edit::SplitFragment { id, cutter, corners } => split_fragment(case, &id, &cutter, &corners)?,
         Edit::Fuse { ids, corners } => fuse(case, &ids, &corners)?,
         Edit::Unsplit { volume } => {
             volume_mut(case, &volume)?;
@@ -578,6 +591,45 @@ fn split_volume(
     Ok(())
 }
 
+fn split_fragment(case: &mut Case, id: &str, cutter: &str, corners: &[Point; 8]) -> Result<(), EditError> {
+    let parent = fragment_mut(case, id)?.clone();
+    let given = cutter_mut(case, cutter)?.clone();
+    let is_moved = parent.pose != Affine::identity();
+    let own = if is_moved {
+        // Cutters are about the volume in its unmoved place, so the cut goes back with the fragment.
+        let own_id = case.free_cutter_id(&format!("{cutter}-{id}"));
+        NamedCutter::new(own_id, given.cutter.moved(&parent.pose.inverse()))
+    } else {
+        given
+    };
+    let misses = || EditError::Misses { cutter: cutter.to_owned(), id: id.to_owned() };
+    if parent.keep.contains_key(&own.id) {
+        return Err(misses());
+    }
+    let (mut cutters, sides): (Vec<Cutter>, Vec<Side>) = case.piece(&parent).keep.into_iter().unzip();
+    cutters.push(own.cutter);
+    let mut patterns = split::patterns(&cutters, corners)?;
+    patterns.retain(|pattern| pattern.starts_with(&sides));
+    if patterns.len() < 2 {
+        return Err(misses());
+    }
+    let mut parts = Vec::with_capacity(2);
+    for side in [Side::Plus, Side::Minus] {
+        let taken = case.fragments.iter().chain(&parts).map(|f: &Fragment| f.id.as_str());
+        let mut part =
+            Fragment { id: Case::free_id(&format!("{id}-{}", parts.len() + 1), taken), ..parent.clone() };
+        part.keep.insert(own.id.clone(), side);
+        parts.push(part);
+    }
+    if let Some(at) = case.fragments.iter().position(|f| f.id == id) {
+        case.fragments.splice(at..=at, parts);
+    }
+    if is_moved {
+        case.cutters.push(own);
+    }
+    Ok(())
+}
+
 fn fuse(case: &mut Case, ids: &[String], corners: &[Point; 8]) -> Result<(), EditError> {
     let refuse = |fault: &str| Err(EditError::Fuse { fault: fault.to_owned() });
     let mut parts = Vec::with_capacity(ids.len());
@@ -641,16 +693,6 @@ fn new_id(kind: &'static str, id: &str, taken: bool) -> Result<(), EditError> {
 
 fn rigid(id: &str, pose: Affine) -> Result<Affine, EditError> {
     pose.require_rigid().map_err(|source| EditError::Pose { id: id.to_owned(), source })
-}
-
-/// A cutter's fields are public, so what came from elsewhere than its constructors is checked.
-fn valid(cutter: &Cutter) -> Result<(), EditError> {
-    match *cutter {
-        Cutter::Plane { point, normal } => Cutter::plane(point, normal)?,
-        Cutter::Cylinder { point, axis, radius_mm } => Cutter::cylinder(point, axis, radius_mm)?,
-        _ => return Ok(()),
-    };
-    Ok(())
 }
 
 fn positive(value: f64) -> Result<f64, EditError> {

@@ -10,7 +10,9 @@ use std::sync::Arc;
 
 use render::scene::{Camera, Projection, Shading, TextureFormat, VolumeMode};
 use render::volume::TransferError;
-use render::volume::{Affine, ControlPoint, Cutter, CutterError, Point, Side, SpaceError, Transfer, Vector};
+use render::volume::{
+    Affine, ControlPoint, Cutter, CutterError, Point, Shape, Side, SpaceError, Transfer, Vector,
+};
 use serde_json::{Map, Value};
 
 use super::{Case, Fragment, Implant, NamedCutter, Other, Source, Volume};
@@ -196,42 +198,49 @@ fn transfer(value: Value, at: String) -> Read<(Transfer, Other)> {
 }
 
 fn cutter(value: Value, at: String) -> Read<NamedCutter> {
+    const KINDS: [&str; 4] = ["plane", "cylinder", "dome", "blade"];
     let mut fields = Fields::of(value, at)?;
     let id = fields.string("id")?;
-    let (made, shape, at) = match (fields.take("plane"), fields.take("cylinder")) {
-        (Some((value, at)), None) => {
-            let mut shape = Fields::of(value, at)?;
-            let point = Point::from(shape.triple("point")?);
-            let normal = Vector::from(shape.triple("normal")?);
-            (Cutter::plane(point, normal), shape.map, shape.at)
-        }
-        (None, Some((value, at))) => {
-            let mut shape = Fields::of(value, at)?;
-            let point = Point::from(shape.triple("point")?);
-            let axis = Vector::from(shape.triple("axis")?);
-            let (radius, at) = shape.need("radius_mm")?;
-            (Cutter::cylinder(point, axis, number(radius, at)?), shape.map, shape.at)
-        }
-        (None, None) => {
-            return fault(fields.at, "is neither a plane nor a cylinder", "add \"plane\" or \"cylinder\"");
-        }
-        (Some(_), Some(_)) => {
-            return fault(fields.at, "is both a plane and a cylinder", "make two cutters of it");
-        }
+    let mut given = KINDS.into_iter().filter_map(|kind| Some((kind, fields.take(kind)?))).collect::<Vec<_>>();
+    let Some((kind, (value, at))) = given.pop() else {
+        let remedy = "add \"plane\", \"cylinder\", \"dome\" or \"blade\"";
+        return fault(fields.at, "is neither a plane nor a cylinder, dome or blade", remedy);
     };
-    match made {
-        Ok(cutter) => Ok(NamedCutter { id, cutter, cutter_other: shape, other: fields.map }),
-        Err(error) => {
-            let (at, remedy) = match error {
-                CutterError::NoDirection => (at, "write a direction that is not 0 0 0"),
-                CutterError::Radius { .. } => {
-                    (format!("{at}.radius_mm"), "write a radius in mm, more than 0")
-                }
-                _ => (at, "write finite numbers"),
-            };
-            fault(at, error.to_string(), remedy)
-        }
+    if let Some((other, _)) = given.pop() {
+        return fault(fields.at, format!("is both a {other} and a {kind}"), "make two cutters of it");
     }
+    let mut of = Fields::of(value, at)?;
+    let shape = match kind {
+        "plane" => Shape::Plane { point: of.point("point")?, normal: of.vector("normal")? },
+        "cylinder" => Shape::Cylinder {
+            point: of.point("point")?,
+            axis: of.vector("axis")?,
+            radius_mm: of.number("radius_mm")?,
+        },
+        "dome" => Shape::Dome { centre: of.point("centre")?, radius_mm: of.number("radius_mm")? },
+        _ => Shape::Blade {
+            point: of.point("point")?,
+            normal: of.vector("normal")?,
+            right: of.vector("right")?,
+            width_mm: of.number("width_mm")?,
+            height_mm: of.number("height_mm")?,
+        },
+    };
+    let kerf_mm = fields.or("kerf_mm", 0.0, number)?;
+    let error = match Cutter::new(shape, kerf_mm) {
+        Ok(cutter) => return Ok(NamedCutter { id, cutter, cutter_other: of.map, other: fields.map }),
+        Err(error) => error,
+    };
+    let (at, remedy) = match error {
+        CutterError::NoDirection => (of.at, "write a direction that is not 0 0 0"),
+        CutterError::NoRight => (of.path("right"), "write a direction across the normal"),
+        CutterError::Radius { .. } => (of.path("radius_mm"), "write a radius in mm, more than 0"),
+        CutterError::Extent { .. } => (of.at, "write a width and a height in mm, more than 0"),
+        CutterError::Kerf { .. } => (fields.path("kerf_mm"), "write a thickness in mm, 0 or more"),
+        CutterError::NothingInside { .. } => (fields.path("kerf_mm"), "write less than twice the radius"),
+        _ => (of.at, "write finite numbers"),
+    };
+    fault(at, error.to_string(), remedy)
 }
 
 fn fragment(value: Value, at: String) -> Read<Fragment> {
@@ -278,8 +287,8 @@ fn implant(value: Value, at: String, folder: &Path) -> Read<Implant> {
 
 fn camera(value: Value, at: String) -> Read<(Camera, Other)> {
     let mut fields = Fields::of(value, at)?;
-    let eye = Point::from(fields.triple("eye")?);
-    let target = Point::from(fields.triple("target")?);
+    let eye = fields.point("eye")?;
+    let target = fields.point("target")?;
     let up = fields.or("up", [0.0, 0.0, 1.0], numbers::<3>)?;
     let projection = match (fields.take("fov_deg"), fields.take("parallel_mm")) {
         (Some(_), Some(_)) => {
@@ -300,6 +309,19 @@ impl Fields {
     fn triple(&mut self, key: &str) -> Read<[f64; 3]> {
         let (value, at) = self.need(key)?;
         numbers(value, at)
+    }
+
+    fn point(&mut self, key: &str) -> Read<Point> {
+        self.triple(key).map(Point::from)
+    }
+
+    fn vector(&mut self, key: &str) -> Read<Vector> {
+        self.triple(key).map(Vector::from)
+    }
+
+    fn number(&mut self, key: &str) -> Read<f64> {
+        let (value, at) = self.need(key)?;
+        number(value, at)
     }
 }
 

@@ -4,7 +4,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use render::scene::{Projection, Shading, VolumeMode};
-use render::volume::{Cutter, Side};
+use render::volume::{Shape, Side};
 use serde_json::{Map, Value, json};
 
 use super::{Case, Fragment, Implant, LabelSet, NamedCutter, Other, Source, Volume};
@@ -111,24 +111,38 @@ fn shading_name(shading: Shading, lit: &'static str) -> &'static str {
 
 fn cutter(c: &NamedCutter) -> Value {
     let mut shape = Map::new();
-    let kind = match &c.cutter {
-        Cutter::Plane { point, normal } => {
+    let kind = match c.cutter.shape() {
+        Shape::Plane { point, normal } => {
             put(&mut shape, "point", json!(point.coords.as_slice()));
             put(&mut shape, "normal", json!(normal.as_slice()));
             "plane"
         }
-        Cutter::Cylinder { point, axis, radius_mm } => {
+        Shape::Cylinder { point, axis, radius_mm } => {
             put(&mut shape, "point", json!(point.coords.as_slice()));
             put(&mut shape, "axis", json!(axis.as_slice()));
             put(&mut shape, "radius_mm", json!(radius_mm));
             "cylinder"
         }
-        // `Cutter` may grow; a kind this file format does not know cannot be in a case.
-        _ => "unknown",
+        Shape::Dome { centre, radius_mm } => {
+            put(&mut shape, "centre", json!(centre.coords.as_slice()));
+            put(&mut shape, "radius_mm", json!(radius_mm));
+            "dome"
+        }
+        Shape::Blade { point, normal, right, width_mm, height_mm } => {
+            put(&mut shape, "point", json!(point.coords.as_slice()));
+            put(&mut shape, "normal", json!(normal.as_slice()));
+            put(&mut shape, "right", json!(right.as_slice()));
+            put(&mut shape, "width_mm", json!(width_mm));
+            put(&mut shape, "height_mm", json!(height_mm));
+            "blade"
+        }
     };
     let mut map = Map::new();
     put(&mut map, "id", json!(c.id));
     put(&mut map, kind, with(shape, &c.cutter_other));
+    if c.cutter.kerf_mm() > 0.0 {
+        put(&mut map, "kerf_mm", json!(c.cutter.kerf_mm()));
+    }
     with(map, &c.other)
 }
 

@@ -51,7 +51,7 @@ fn volume_place(scene: &Scene, ball: Ball, ray: &Ray) -> Option<f64> {
         for of in &pieces {
             let Some(value) = of.item.grid.sample(&of.voxel_from_world.point(&p)) else { continue };
             let unmoved = of.unmoved_from_world.point(&p);
-            if of.piece.keep.iter().all(|(cutter, side)| cutter.side(&unmoved) == *side) {
+            if of.piece.keep.iter().all(|(cutter, side)| cutter.keeps(*side, &unmoved)) {
                 let (_, extinction) = of.item.transfer.classify(value);
                 through *= (-extinction * step_mm).exp();
             }

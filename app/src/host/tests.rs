@@ -7,7 +7,7 @@ use std::time::Duration;
 use egui::{Key, Modifiers, PointerButton, pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use render::volume::{Cutter, Point, Vector};
+use render::volume::{Cutter, Point, Shape, Vector};
 
 use super::frame::Host;
 use super::registry::Registry;
@@ -149,7 +149,8 @@ fn a_handle_is_dragged_in_the_view_and_escape_puts_it_back() {
     let points_per_mm = f64::from(view.height()) / 2.0 / (distance * 15.0_f64.to_radians().tan());
     let tip = view.center() - egui::vec2(0.0, (ball_mm * 0.35 * 0.8 * points_per_mm) as f32);
     drag(&mut window, tip, tip - egui::vec2(0.0, 40.0));
-    let Cutter::Plane { point, normal } = cutter(&window) else { panic!("a plane") };
+    let dragged = cutter(&window);
+    let Shape::Plane { point, normal } = *dragged.shape() else { panic!("a plane") };
     let went = point.z - 15.0;
     assert!((went - 40.0 / points_per_mm).abs() < 0.05 * went, "as far as the pointer: {went} mm");
     assert_eq!((point.x, point.y, normal), (23.0, 19.0, Vector::z()), "along its normal alone");
@@ -160,10 +161,10 @@ fn a_handle_is_dragged_in_the_view_and_escape_puts_it_back() {
         window.event(egui::Event::PointerMoved(tip - egui::vec2(0.0, 10.0 * step as f32)));
         window.step();
     }
-    assert_ne!(cutter(&window), Cutter::Plane { point, normal }, "it follows");
+    assert_ne!(cutter(&window), dragged, "it follows");
     window.key_press(Key::Escape);
     window.run_steps(2);
-    assert_eq!(cutter(&window), Cutter::Plane { point, normal }, "back where the drag began");
+    assert_eq!(cutter(&window), dragged, "back where the drag began");
 }
 
 fn press(window: &mut Harness<'_, Host>, at: egui::Pos2, pressed: bool) {

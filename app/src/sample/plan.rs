@@ -42,17 +42,13 @@ fn trochanter_pose() -> Affine {
 pub(super) fn case() -> Case {
     let head = t::head_centre();
     let cuts = [
-        Cutter::Plane {
-            point: head - t::neck_axis() * CUT_MM,
-            normal: Vector::new(0.86, 0.18, -0.47).normalize(),
-        },
-        Cutter::Plane {
-            point: head + Vector::new(46.0, 14.0, -33.0),
-            normal: Vector::new(0.80, 0.10, 0.59).normalize(),
-        },
+        Cutter::plane(head - t::neck_axis() * CUT_MM, Vector::new(0.86, 0.18, -0.47).normalize()),
+        Cutter::plane(head + Vector::new(46.0, 14.0, -33.0), Vector::new(0.80, 0.10, 0.59).normalize()),
     ];
     let ids = ["intertrochanteric", "trochanteric"];
-    let cutters = ids.iter().zip(cuts).map(|(id, cut)| NamedCutter::new(*id, cut)).collect();
+    // The numbers above are those of planes, so none is left out.
+    let cutters =
+        ids.iter().zip(cuts).filter_map(|(id, cut)| Some(NamedCutter::new(*id, cut.ok()?))).collect();
     let piece = |id: &str, keep: &[(&str, Side)], pose: Affine| {
         let keep: BTreeMap<String, Side> = keep.iter().map(|(id, side)| ((*id).to_owned(), *side)).collect();
         Fragment { pose, ..Fragment::new(id, "ct", keep) }

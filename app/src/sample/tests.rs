@@ -450,7 +450,7 @@ fn the_stem_lies_in_the_canal_with_its_ball_in_the_heads_centre() {
 fn the_plan_cuts_the_femur_in_three_and_leaves_the_pelvis_whole() {
     let case = super::case();
     let piece = |id: &str| case.piece(case.fragment(id).unwrap_or_else(|| panic!("no fragment {id}")));
-    let holds = |id: &str, p: Point| piece(id).keep.iter().all(|(cutter, side)| cutter.side(&p) == *side);
+    let holds = |id: &str, p: Point| piece(id).keep.iter().all(|(cutter, side)| cutter.keeps(*side, &p));
     let junction = t::neck_shaft_junction();
     let places = [
         ("head", t::head_centre()),

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use render::volume::{
-    Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Series, Side, Transfer, TriangleMesh, Vector,
+    Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Series, Shape, Side, Transfer, TriangleMesh,
+    Vector,
 };
 
 use super::register_all;
@@ -117,7 +118,7 @@ fn a_plane_is_added_through_the_crosshair() {
     let [Edit::AddCutter(cutter)] = panel.state().edits.as_slice() else {
         panic!("one new cutter, not {:?}", panel.state().edits)
     };
-    let Cutter::Plane { point, normal } = cutter.cutter else { panic!("a plane") };
+    let Shape::Plane { point, normal } = *cutter.cutter.shape() else { panic!("a plane") };
     assert_eq!((point, normal), (Point::new(1.0, 2.0, 3.0), -Vector::y()), "there, facing the front");
     assert!(panel.state().selection.split_by.contains(&cutter.id), "ready to split by");
 }

@@ -7,7 +7,7 @@ use super::table::Table;
 use crate::scene::{Piece, Shading, VolumeItem, light};
 use crate::view::View;
 use crate::volume::convex::HalfSpace;
-use crate::volume::{Affine, Cutter, Point, Side, Vector};
+use crate::volume::{Affine, Body, Face, Point, Vector};
 
 /// A volume with its transfer function, kept from picture to picture.
 #[derive(Debug)]
@@ -17,12 +17,13 @@ pub(super) struct Prepared<'a> {
     pub(super) table: &'a Table,
 }
 
-/// A round cutter: where a ray is within it.
+/// A convex body of a cutter: a ray is within it along one stretch.
 #[derive(Debug)]
-struct Tube {
-    /// Distances from the axis along two directions at right angles; mm.
-    across: [Form; 2],
-    radius_mm: f64,
+enum Inside {
+    /// Within a distance of a line or a point, by its parts along two or three directions at right angles.
+    Round { parts: Vec<Form>, radius_mm: f64 },
+    /// Where all are positive.
+    Prism(Vec<Form>),
 }
 
 /// A piece before the camera.
@@ -35,8 +36,8 @@ pub(super) struct Placed<'a> {
     planes: Vec<Form>,
     /// The same in view space.
     half_spaces: Vec<HalfSpace>,
-    inside: Vec<Tube>,
-    outside: Vec<Tube>,
+    inside: Vec<Inside>,
+    outside: Vec<Inside>,
     /// Takes a gradient by voxel steps, positions a voxel, to view space, positions a mm.
     gradient: [[f32; 3]; 3],
     pub(super) lit: bool,
@@ -74,16 +75,32 @@ impl<'a> Placed<'a> {
         }
         let (mut inside, mut outside) = (Vec::new(), Vec::new());
         for (cutter, side) in &piece.keep {
-            match cutter {
-                Cutter::Plane { point, normal } => {
-                    let normal = if *side == Side::Plus { *normal } else { -*normal };
-                    half_spaces.push(HalfSpace::new(point, normal).transformed(&view_from_unmoved));
+            let (body, is_inside) = cutter.solid(*side);
+            let behind =
+                |face: &Face| HalfSpace::new(&face.point, -face.normal).transformed(&view_from_unmoved);
+            let round = match &body {
+                Body::HalfSpace(face) if !is_inside => {
+                    let half = HalfSpace::new(&face.point, face.normal);
+                    half_spaces.push(half.transformed(&view_from_unmoved));
+                    continue;
                 }
-                Cutter::Cylinder { point, axis, radius_mm } => {
-                    let tube = Tube::new(point, axis, *radius_mm, &view_from_unmoved, rays);
-                    if *side == Side::Minus { inside.push(tube) } else { outside.push(tube) }
+                Body::HalfSpace(_) | Body::Prism(_) if is_inside => {
+                    half_spaces.extend(body.faces().iter().map(behind));
+                    continue;
                 }
-            }
+                Body::HalfSpace(_) | Body::Prism(_) => {
+                    Inside::Prism(body.faces().iter().map(|face| rays.form(&behind(face))).collect())
+                }
+                Body::Cylinder { point, axis, radius_mm } => {
+                    let [u, v] = across(axis);
+                    Inside::round(point, &[u, v], *radius_mm, &view_from_unmoved, rays)
+                }
+                Body::Ball { centre, radius_mm } => {
+                    let axes = [Vector::x(), Vector::y(), Vector::z()];
+                    Inside::round(centre, &axes, *radius_mm, &view_from_unmoved, rays)
+                }
+            };
+            if is_inside { inside.push(round) } else { outside.push(round) }
         }
         for half in &mut half_spaces {
             let length = half.normal.norm();
@@ -178,8 +195,8 @@ impl<'a> Placed<'a> {
                 return None;
             }
         }
-        for tube in &self.inside {
-            let [a, b] = tube.within(lens);
+        for body in &self.inside {
+            let [a, b] = body.within(lens);
             (from, to) = (from.max(a), to.min(b));
         }
         (from < to).then_some([from, to])
@@ -196,8 +213,8 @@ impl<'a> Placed<'a> {
     pub(super) fn stretches(&self, lens: [f64; 2], range: [f64; 2], into: &mut Stretches) {
         into.clear();
         into.extend(self.hull(lens, range));
-        for tube in &self.outside {
-            let [a, b] = tube.within(lens);
+        for body in &self.outside {
+            let [a, b] = body.within(lens);
             if a < b {
                 remove(into, a, b);
             }
@@ -228,36 +245,75 @@ fn remove(stretches: &mut Stretches, a: f64, b: f64) {
     }
 }
 
-impl Tube {
-    fn new(point: &Point, axis: &Vector, radius_mm: f64, view_from_unmoved: &Affine, rays: &Rays) -> Self {
-        let axis = axis.try_normalize(0.0).unwrap_or_else(Vector::z);
-        let mut other = Vector::zeros();
-        other[axis.iamin()] = 1.0;
-        let u = axis.cross(&other).try_normalize(0.0).unwrap_or_else(Vector::x);
-        let form = |normal: Vector| rays.form(&HalfSpace::new(point, normal).transformed(view_from_unmoved));
-        Self { across: [form(u), form(axis.cross(&u))], radius_mm }
+/// Two directions at right angles to `axis` and to each other, of length 1.
+fn across(axis: &Vector) -> [Vector; 2] {
+    let axis = axis.try_normalize(0.0).unwrap_or_else(Vector::z);
+    let mut other = Vector::zeros();
+    other[axis.iamin()] = 1.0;
+    let u = axis.cross(&other).try_normalize(0.0).unwrap_or_else(Vector::x);
+    [u, axis.cross(&u)]
+}
+
+/// A stretch that is none.
+const NOWHERE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+impl Inside {
+    fn round(
+        centre: &Point,
+        directions: &[Vector],
+        radius_mm: f64,
+        view_from_unmoved: &Affine,
+        rays: &Rays,
+    ) -> Self {
+        let form =
+            |normal: &Vector| rays.form(&HalfSpace::new(centre, *normal).transformed(view_from_unmoved));
+        Self::Round { parts: directions.iter().map(form).collect(), radius_mm }
     }
 
     /// The stretch inside; not rising where there is none.
     fn within(&self, lens: [f64; 2]) -> [f64; 2] {
-        let [u, v] = [0, 1].map(|i: usize| self.across[i].on(lens));
-        let a = u[1] * u[1] + v[1] * v[1];
-        let radius = self.radius_mm;
-        if a < 1e-30 {
-            let is_inside = u[0] * u[0] + v[0] * v[0] < radius * radius;
-            return if is_inside {
-                [f64::NEG_INFINITY, f64::INFINITY]
-            } else {
-                [f64::INFINITY, f64::NEG_INFINITY]
-            };
+        match self {
+            Self::Round { parts, radius_mm } => within_round(parts, *radius_mm, lens),
+            Self::Prism(faces) => {
+                let [mut from, mut to] = [f64::NEG_INFINITY, f64::INFINITY];
+                for face in faces {
+                    let [start, growth] = face.on(lens);
+                    let crossing = -start / growth;
+                    if growth > 0.0 {
+                        from = from.max(crossing);
+                    } else if growth < 0.0 {
+                        to = to.min(crossing);
+                    } else if start <= 0.0 {
+                        return NOWHERE;
+                    }
+                }
+                [from, to]
+            }
         }
-        // By the distance of closest approach: no cancellation for a far eye.
-        let closest = u[0] * v[1] - u[1] * v[0];
-        let discriminant = radius * radius * a - closest * closest;
-        if discriminant <= 0.0 {
-            return [f64::INFINITY, f64::NEG_INFINITY];
-        }
-        let (middle, half) = (-(u[0] * u[1] + v[0] * v[1]) / a, discriminant.sqrt() / a);
-        [middle - half, middle + half]
     }
+}
+
+fn within_round(parts: &[Form], radius: f64, lens: [f64; 2]) -> [f64; 2] {
+    let (mut start2, mut growth2, mut product) = (0.0, 0.0, 0.0);
+    let mut lines = [[0.0; 2]; 3];
+    for (line, part) in lines.iter_mut().zip(parts) {
+        let [start, growth] = part.on(lens);
+        *line = [start, growth];
+        start2 += start * start;
+        growth2 += growth * growth;
+        product += start * growth;
+    }
+    if growth2 < 1e-30 {
+        let is_inside = start2 < radius * radius;
+        return if is_inside { [f64::NEG_INFINITY, f64::INFINITY] } else { NOWHERE };
+    }
+    // By the distance of closest approach: no cancellation for a far eye.
+    let area = |i: usize, k: usize| lines[i][0] * lines[k][1] - lines[i][1] * lines[k][0];
+    let closest2 = area(0, 1).powi(2) + area(1, 2).powi(2) + area(2, 0).powi(2);
+    let discriminant = radius * radius * growth2 - closest2;
+    if discriminant <= 0.0 {
+        return NOWHERE;
+    }
+    let (middle, half) = (-product / growth2, discriminant.sqrt() / growth2);
+    [middle - half, middle + half]
 }

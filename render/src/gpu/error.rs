@@ -68,9 +68,11 @@ pub enum GpuError {
         /// As asked.
         height: u32,
     },
-    /// A fragment keeps the outside of more cylinders than the shader counts.
-    #[error("a fragment keeps the outside of {count} cylinders; at most {limit} can be drawn")]
-    Cylinders {
+    /// A fragment keeps the outside of more cutters than the shader counts; planes are not among them.
+    #[error(
+        "a fragment keeps the outside of {count} cylinders, domes and blades; at most {limit} can be drawn"
+    )]
+    Gaps {
         /// As asked.
         count: usize,
         /// What there is.

@@ -76,7 +76,7 @@ impl Layer {
             // The box is the cheaper question, so it comes first.
             let value = self.grid.sample(&piece.voxel_from_world.point(p))?;
             let unmoved = piece.unmoved_from_world.point(p);
-            let kept = piece.keep.iter().all(|(cutter, side)| cutter.side(&unmoved) == *side);
+            let kept = piece.keep.iter().all(|(cutter, side)| cutter.keeps(*side, &unmoved));
             kept.then_some((index, value))
         })
     }

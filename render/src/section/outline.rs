@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Section;
 use crate::scene::Piece;
-use crate::volume::{Affine, Cutter, Grid, Point, TriangleMesh, Vector};
+use crate::volume::{Affine, Body, Cutter, Face, Grid, Point, Side, TriangleMesh, Vector};
 
 /// Where a mesh crosses the section's plane: line pieces in world mm, unordered. `pose` is
 /// `world_from_mesh`. A triangle that lies in the plane gives nothing; its neighbours draw its edges.
@@ -27,28 +27,80 @@ pub fn mesh_outline(section: &Section, mesh: &TriangleMesh, pose: &Affine) -> Ve
 }
 
 /// Where a cutter crosses the section's plane within `reach_mm` of the section's centre: polylines in
-/// world mm. Parallel planes give none.
+/// world mm, those of both borders where there is a kerf. Of a blade it is the outline of what it has
+/// passed. Parallel planes give none.
 pub fn cutter_outline(section: &Section, cutter: &Cutter, reach_mm: f64) -> Vec<Vec<Point>> {
-    let forward = section.forward();
-    match cutter {
-        Cutter::Plane { point, normal } => {
-            let Some(normal) = normal.try_normalize(0.0) else { return Vec::new() };
-            let Some(along) = forward.cross(&normal).try_normalize(1e-9) else { return Vec::new() };
-            // The direction in the section's plane that leads straight to the cutter.
-            let towards = along.cross(&forward);
-            let distance = normal.dot(&(point - section.centre)) / normal.dot(&towards);
-            if distance.abs() > reach_mm {
-                return Vec::new();
-            }
-            let nearest = section.centre + towards * distance;
-            let half = (reach_mm * reach_mm - distance * distance).sqrt();
-            vec![vec![nearest - along * half, nearest + along * half]]
+    let (body, _) = cutter.solid(Side::Plus);
+    let mut lines = body_outline(section, &body, body.faces().len(), reach_mm);
+    if cutter.kerf_mm() > 0.0 {
+        // Of a blade only the face, which comes first, has a kerf.
+        lines.extend(body_outline(section, &cutter.solid(Side::Minus).0, 1, reach_mm));
+    }
+    lines
+}
+
+/// The outline of a round body, or of the first `count` faces of another.
+fn body_outline(section: &Section, body: &Body, count: usize, reach_mm: f64) -> Vec<Vec<Point>> {
+    match body {
+        Body::HalfSpace(_) | Body::Prism(_) => {
+            let faces = body.faces();
+            let of_face =
+                |i: usize| face_line(section, &faces[i], reach_mm).and_then(|l| behind(l, faces, i));
+            (0..count).filter_map(of_face).map(|line| line.to_vec()).collect()
         }
-        Cutter::Cylinder { point, axis, radius_mm } => {
+        Body::Cylinder { point, axis, radius_mm } => {
             let Some(axis) = axis.try_normalize(0.0) else { return Vec::new() };
             cylinder_outline(section, point, axis, *radius_mm, reach_mm)
         }
+        Body::Ball { centre, radius_mm } => {
+            let off = section.depth_mm(centre);
+            if off.abs() >= *radius_mm {
+                return Vec::new();
+            }
+            let radius = (radius_mm * radius_mm - off * off).sqrt();
+            let middle = centre - section.forward() * off;
+            vec![ring(|cos, sin| middle + (section.right * cos + section.down * sin) * radius)]
+        }
     }
+}
+
+/// Where the whole plane of a face crosses that of the section, within reach.
+fn face_line(section: &Section, face: &Face, reach_mm: f64) -> Option<[Point; 2]> {
+    let forward = section.forward();
+    let normal = face.normal.try_normalize(0.0)?;
+    let along = forward.cross(&normal).try_normalize(1e-9)?;
+    // The direction in the section's plane that leads straight to the face.
+    let towards = along.cross(&forward);
+    let distance = normal.dot(&(face.point - section.centre)) / normal.dot(&towards);
+    if distance.abs() > reach_mm {
+        return None;
+    }
+    let nearest = section.centre + towards * distance;
+    let half = (reach_mm * reach_mm - distance * distance).sqrt();
+    Some([nearest - along * half, nearest + along * half])
+}
+
+/// The part of a line on face `own` that lies behind all the other faces.
+fn behind([a, b]: [Point; 2], faces: &[Face], own: usize) -> Option<[Point; 2]> {
+    let (mut from, mut to) = (0.0_f64, 1.0_f64);
+    for (_, face) in faces.iter().enumerate().filter(|(i, _)| *i != own) {
+        let [at_a, at_b] = [a, b].map(|p| face.normal.dot(&(p - face.point)));
+        let crossing = at_a / (at_a - at_b);
+        match (at_a < 0.0, at_b < 0.0) {
+            (true, true) => {}
+            (true, false) => to = to.min(crossing),
+            (false, true) => from = from.max(crossing),
+            (false, false) => return None,
+        }
+    }
+    (from < to).then(|| [from, to].map(|t| a + (b - a) * t))
+}
+
+/// A closed line by cosine and sine of an angle that goes round.
+fn ring(at: impl Fn(f64, f64) -> Point) -> Vec<Point> {
+    const STEPS: usize = 96;
+    let turn = |step: usize| std::f64::consts::TAU * step as f64 / STEPS as f64;
+    (0..=STEPS).map(|step| at(turn(step).cos(), turn(step).sin())).collect()
 }
 
 fn cylinder_outline(
@@ -58,7 +110,6 @@ fn cylinder_outline(
     radius_mm: f64,
     reach_mm: f64,
 ) -> Vec<Vec<Point>> {
-    const STEPS: usize = 96;
     let forward = section.forward();
     let slope = axis.dot(&forward);
     // Seen side on to within a tenth of a degree it is two lines, which the ellipse would not reach.
@@ -83,14 +134,10 @@ fn cylinder_outline(
     seed[axis.iamin()] = 1.0;
     let Some(u) = axis.cross(&seed).try_normalize(1e-9) else { return Vec::new() };
     let v = axis.cross(&u);
-    let ring = (0..=STEPS)
-        .map(|step| {
-            let angle_rad = std::f64::consts::TAU * step as f64 / STEPS as f64;
-            let on = point + (u * angle_rad.cos() + v * angle_rad.sin()) * radius_mm;
-            on - axis * (section.depth_mm(&on) / slope)
-        })
-        .collect();
-    vec![ring]
+    vec![ring(|cos, sin| {
+        let on = point + (u * cos + v * sin) * radius_mm;
+        on - axis * (section.depth_mm(&on) / slope)
+    })]
 }
 
 /// A part of a cutter's line in a section.
@@ -118,10 +165,12 @@ pub fn piece_outlines(section: &Section, grid: &Grid, pose: &Affine, piece: &Pie
         at.iter().zip(grid.extent()).all(|(&c, n)| c >= -0.5 && c <= n as f64 - 0.5)
     };
     let mut lines = Vec::new();
-    for (cutter, (shape, _)) in piece.keep.iter().enumerate() {
+    for (cutter, (shape, side)) in piece.keep.iter().enumerate() {
         let others = || piece.keep.iter().enumerate().filter(move |(other, _)| *other != cutter);
-        let bounds = |p: &Point| in_box(p) && others().all(|(_, (other, side))| other.side(p) == *side);
-        for line in cutter_outline(&unmoved, shape, reach_mm) {
+        let bounds = |p: &Point| in_box(p) && others().all(|(_, (other, side))| other.keeps(*side, p));
+        // The border of the side that is kept, with the kerf on its other side.
+        let (body, _) = shape.solid(*side);
+        for line in body_outline(&unmoved, &body, body.faces().len(), reach_mm) {
             let parts = clipped(&line, section.mm_per_pixel(), &bounds);
             lines.extend(parts.into_iter().map(|part| PieceLine {
                 cutter,
@@ -171,4 +220,70 @@ fn clipped(line: &[Point], step_mm: f64, inside: &impl Fn(&Point) -> bool) -> Ve
         (1..=steps).for_each(|i| take(pair[0] + along * (i as f64 / steps as f64)));
     }
     parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cutter_outlines_lie_on_the_cutter_and_in_the_plane() {
+        let section = Section::new(Point::new(1.0, 2.0, 3.0), Vector::x(), -Vector::z(), 0.5, [80, 60])
+            .expect("section");
+        let centre = Point::new(4.0, 5.0, 2.0);
+        let tilted = Vector::new(1.0, 0.7, -0.4);
+        let plane = Cutter::plane(centre, tilted).expect("plane");
+        let lines = cutter_outline(&section, &plane, 100.0);
+        assert_eq!(lines.len(), 1, "one line");
+        for p in lines.iter().flatten() {
+            assert!(tilted.dot(&(p - centre)).abs() < 1e-9, "on the plane: {p}");
+            assert!(section.depth_mm(p).abs() < 1e-9, "in the section: {p}");
+        }
+        for axis in [tilted, Vector::new(1.0, 0.0, 2.0)] {
+            let tube = Cutter::cylinder(centre, axis, 8.0).expect("tube");
+            let lines = cutter_outline(&section, &tube, 100.0);
+            assert!(!lines.is_empty(), "the tube is met");
+            for p in lines.iter().flatten() {
+                let distance = (p - centre).cross(&axis).norm() / axis.norm();
+                assert!((distance - 8.0).abs() < 1e-9, "on the tube: {distance}");
+                assert!(section.depth_mm(p).abs() < 1e-9, "in the section: {p}");
+            }
+        }
+        let dome = Cutter::dome(centre, 4.0).expect("dome").with_kerf(1.0).expect("kerf");
+        let lines = cutter_outline(&section, &dome, 100.0);
+        assert_eq!(lines.len(), 2, "both borders of the kerf");
+        for (line, radius) in lines.iter().zip([4.5, 3.5]) {
+            for p in line {
+                assert!(((p - centre).norm() - radius).abs() < 1e-9, "on the ball: {p}");
+                assert!(section.depth_mm(p).abs() < 1e-9, "in the section: {p}");
+            }
+        }
+        let parallel = Cutter::plane(centre, Vector::y()).expect("plane");
+        assert!(cutter_outline(&section, &parallel, 100.0).is_empty(), "a parallel plane is not met");
+    }
+
+    #[test]
+    fn a_blade_is_outlined_by_its_face_and_what_it_has_passed() {
+        let section =
+            Section::new(Point::origin(), Vector::x(), -Vector::z(), 0.5, [80, 60]).expect("section");
+        let lines = cutter_outline(&section, &blade_of(6.0).with_kerf(0.5).expect("kerf"), 20.0);
+        // The section at y = 0 passes within the height of 6 about y = 1.
+        let length = |l: &Vec<Point>| (l[1] - l[0]).norm();
+        assert_eq!(lines.len(), 4, "the face, two sides, and the face's other border: {lines:?}");
+        for (line, height) in [(&lines[0], 3.25), (&lines[3], 2.75)] {
+            assert!((length(line) - 8.0).abs() < 1e-9, "as wide as the blade: {line:?}");
+            assert!(line.iter().all(|p| (p.z - height).abs() < 1e-9), "half a kerf away: {line:?}");
+        }
+        for (line, x) in [(&lines[1], 6.0), (&lines[2], -2.0)] {
+            assert!(line.iter().all(|p| (p.x - x).abs() < 1e-9), "at the end of the blade: {line:?}");
+            assert!(line.iter().any(|p| (p.z - 3.25).abs() < 1e-9), "from its edge: {line:?}");
+            assert!(length(line) > 20.0, "and back as far as one sees: {line:?}");
+        }
+        let beside = Section::new(Point::new(0.0, 5.0, 0.0), Vector::x(), -Vector::z(), 0.5, [8, 8]);
+        assert!(cutter_outline(&beside.expect("section"), &blade_of(6.0), 20.0).is_empty(), "beside it");
+    }
+
+    fn blade_of(height: f64) -> Cutter {
+        Cutter::blade(Point::new(2.0, 1.0, 3.0), Vector::z(), Vector::x(), [8.0, height]).expect("blade")
+    }
 }

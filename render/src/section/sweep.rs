@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::Section;
 use super::layer::Prepared;
-use crate::volume::{Cutter, Grid, Point, Samples, Side, Vector};
+use crate::volume::{Body, Face, Grid, Point, Samples, Vector};
 
 /// A row of places in some space: the pixel `i` is at `from + i·step`.
 #[derive(Debug, Clone, Copy)]
@@ -69,26 +69,20 @@ fn keep(piece: &Prepared<'_>, row_in_world: &Row, range: Range<usize>, kept: &mu
     kept[range.clone()].fill(true);
     let row = row_in_world.in_space(&piece.unmoved_from_world);
     for (cutter, side) in piece.keep {
-        let height = |p: &Point| match cutter {
-            Cutter::Plane { point, normal } => normal.dot(&(p - point)),
-            _ => 0.0,
-        };
-        // Far from a plane its height says the side; near it, and for all else, the cutter is asked itself.
-        let (first, rise, near) = match cutter {
-            Cutter::Plane { point, normal } => {
+        let (body, inside) = cutter.solid(*side);
+        // Far from a plane its height says the side; near it, and for all else, the body is asked itself.
+        let (first, rise, near) = match &body {
+            Body::HalfSpace(Face { point, normal }) => {
                 let size = row.from.coords.amax() + point.coords.amax() + row.step.amax() * range.end as f64;
-                (height(&row.from), normal.dot(&row.step), 1e-9 * normal.amax() * (1.0 + size))
+                let height = normal.dot(&(row.from - point));
+                (height, normal.dot(&row.step), 1e-9 * normal.amax() * (1.0 + size))
             }
             _ => (0.0, 0.0, f64::INFINITY),
         };
         for i in range.clone().filter(|&i| kept[i]).collect::<Vec<_>>() {
             let rough = first + rise * i as f64;
-            let found = if rough.abs() > near {
-                if rough > 0.0 { Side::Plus } else { Side::Minus }
-            } else {
-                cutter.side(&row.at(i))
-            };
-            kept[i] = found == *side;
+            let held = if rough.abs() > near { rough < 0.0 } else { body.holds(&row.at(i)) };
+            kept[i] = held == inside;
         }
     }
 }

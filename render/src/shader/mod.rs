@@ -83,10 +83,10 @@ pub fn mirrors() -> Vec<Mirror> {
         mirror!(crate::view::gpu_data::Form as "Form" { at_near, per_mm }),
         mirror!(crate::passes::slabs::gpu_data::Fragment as "Fragment" {
             u, v, w, gradient_x, gradient_y, gradient_z, table_scale, table_offset, table_row, unit_mm,
-            plane_first, plane_end, cylinder_first, cylinder_end, channel, stack,
+            plane_first, plane_end, round_first, round_end, block_first, block_end, pad_0, pad_1, channel, stack,
         }),
-        mirror!(crate::passes::slabs::gpu_data::Cylinder as "Cylinder" {
-            u, v, radius_mm, outside, pad_0, pad_1,
+        mirror!(crate::passes::slabs::gpu_data::Round as "Round" {
+            u, v, w, radius_mm, outside, pad_0, pad_1,
         }),
         mirror!(crate::texture::gpu_data::Decode as "Decode" {
             columns, rows, layers, layer_first, s, slices, pitch, table_first, shift, top, pad_0, pad_1,

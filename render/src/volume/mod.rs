@@ -16,6 +16,7 @@ mod grid;
 mod labels;
 mod mesh;
 mod packed;
+pub mod partition;
 mod series;
 mod space;
 pub mod synth;
@@ -23,7 +24,7 @@ mod transfer;
 
 pub use bricks::Bricks;
 pub use cells::CellGrid;
-pub use cutter::{Cutter, CutterError, Side};
+pub use cutter::{Body, Cutter, CutterError, Face, Shape, Side};
 pub use grid::{Grid, GridError, Rescale, Samples};
 pub use labels::{default_color, label_at, label_of};
 pub use mesh::{MeshError, TriangleMesh};

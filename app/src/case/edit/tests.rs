@@ -66,7 +66,7 @@ fn a_split_makes_every_piece_that_is_not_empty() {
     assert_eq!(case.fragments.len(), 4, "far cuts nothing off");
     for p in [[3.0, 4.0, 5.0], [-3.0, 4.0, 5.0], [0.0, -1.0, 2.0], [-9.0, -9.0, -9.0]] {
         let at = Point::from(p);
-        let holds = |f: &&Fragment| case.piece(f).keep.iter().all(|(c, s)| c.side(&at) == *s);
+        let holds = |f: &&Fragment| case.piece(f).keep.iter().all(|(c, s)| c.keeps(*s, &at));
         assert_eq!(case.fragments.iter().filter(holds).count(), 1, "{p:?} is in one piece");
     }
 }
@@ -125,6 +125,68 @@ fn all_pieces_fuse_to_the_whole() {
     assert!(keep.keys().all(|id| id == "far"), "no cut through the volume is left: {keep:?}");
 }
 
+/// A place of the volume is, before and after, in the piece that the cut's side says, where it is now.
+#[test]
+fn a_fragment_is_split_where_it_was_moved_to() {
+    let mut case = planned();
+    split(&mut case, &["x"]).expect("split");
+    let id = id_of(&case, "+");
+    let pose = Affine::rotation_about(Point::new(3.0, 1.0, 0.0), Vector::z(), 1.5)
+        * Affine::translation(Vector::new(40.0, 0.0, 0.0));
+    apply(&mut case, Edit::SetFragmentPose { id: id.clone(), pose }).expect("moved");
+    let now = pose.point(&Point::new(5.0, 1.0, 2.0));
+    let dome = Cutter::dome(now, 3.0).and_then(|c| c.with_kerf(0.5)).expect("dome");
+    apply(&mut case, Edit::AddCutter(NamedCutter::new("dome", dome))).expect("cutter");
+    let cut =
+        |id: &str| Edit::SplitFragment { id: id.to_owned(), cutter: "dome".to_owned(), corners: corners() };
+    let before = case.clone();
+    apply(&mut case, cut(&id)).expect("split where it is");
+    assert_eq!(case.fragments.len(), 3, "two in the place of one");
+    assert!(
+        case.fragment(&id).is_none() && case.cutters.len() == before.cutters.len() + 1,
+        "by its own cutter"
+    );
+    let parts: Vec<_> = case.fragments.iter().filter(|f| f.pose == pose).collect();
+    let (mut inside, mut outside, mut taken) = (0, 0, 0);
+    for i in 0..1000 {
+        let unmoved = Point::new(f64::from(i % 10), f64::from(i / 10 % 10) - 4.5, f64::from(i / 100) - 4.5)
+            + Vector::x() * 0.3;
+        let holds = |f: &Fragment| case.piece(f).keep.iter().all(|(c, s)| c.keeps(*s, &unmoved));
+        let known = dome.side(&pose.point(&unmoved));
+        let found = [holds(parts[0]), holds(parts[1])];
+        let expected = [known == Some(Side::Plus), known == Some(Side::Minus)];
+        assert_eq!(found, expected, "{unmoved}");
+        outside += usize::from(found[0]);
+        inside += usize::from(found[1]);
+        taken += usize::from(known.is_none());
+    }
+    assert!(inside > 20 && outside > 500 && taken > 5, "{inside} {outside} {taken}");
+    let other = id_of(&before, "-");
+    let missed = apply(&mut case, cut(&other));
+    assert!(
+        matches!(missed, Err(EditError::Misses { .. })),
+        "it is not where the other piece is: {missed:?}"
+    );
+}
+
+#[test]
+fn an_unmoved_fragment_is_split_by_the_cutter_itself() {
+    let mut case = planned();
+    split(&mut case, &["x"]).expect("split");
+    let (id, cutters) = (id_of(&case, "-"), case.cutters.len());
+    let cut = |id: String| Edit::SplitFragment { id, cutter: "y".to_owned(), corners: corners() };
+    apply(&mut case, cut(id)).expect("split");
+    assert_eq!((case.fragments.len(), case.cutters.len()), (3, cutters), "no other cutter is needed");
+    let part = id_of(&case, "-+");
+    assert!(
+        matches!(apply(&mut case, cut(part.clone())), Err(EditError::Misses { .. })),
+        "it is cut already"
+    );
+    let rest = id_of(&case, "--");
+    fused(&mut case, &[&part, &rest]).expect("and back");
+    assert_eq!(case.fragments.len(), 2, "as before");
+}
+
 #[test]
 fn what_is_used_is_not_removed() {
     let mut case = planned();
@@ -170,7 +232,6 @@ fn numbers_out_of_range_are_refused() {
     let mut m = Affine::identity().to_row_major();
     m[0] = 2.0;
     let stretched = Affine::from_row_major(&m).expect("affine");
-    let flat = Cutter::Plane { point: Point::origin(), normal: Vector::zeros() };
     for edit in [
         Edit::SetImplantOpacity { id: stem(), opacity: f64::NAN },
         Edit::SetImplantOpacity { id: stem(), opacity: 1.1 },
@@ -179,7 +240,6 @@ fn numbers_out_of_range_are_refused() {
         Edit::SetImplantScale { id: stem(), scale: f64::INFINITY },
         Edit::SetImplantPose { id: stem(), pose: stretched },
         Edit::SetVolumePose { id: "ct".to_owned(), pose: stretched },
-        Edit::SetCutter { id: "x".to_owned(), cutter: flat },
         Edit::SetBackground([0.0, 0.0, 2.0]),
         Edit::AddVolume(volume("ct")),
         Edit::AddVolume(volume("")),

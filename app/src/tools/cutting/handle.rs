@@ -3,17 +3,18 @@
 //!
 //! A plane's handle is a disc with an arrow along its normal. The arrow or the disc moves the plane
 //! along the normal, the middle dot slides the handle within the plane (which changes where it turns,
-//! not what it cuts), the four dots on the rim turn it about the middle. A cylinder's handle is its
-//! middle (moves it in the plane of the picture) and a dot on its wall (its radius).
+//! not what it cuts), the four dots on the rim turn it about the middle. A blade's is its rectangle, with
+//! the same parts; sliding it within its plane does change what it cuts. A cylinder's or dome's handle is
+//! its middle (moves it in the plane of the picture) and a dot on its wall (its radius).
 
-use render::volume::{Affine, Cutter, Point, Vector};
+use render::volume::{Affine, Cutter, Point, Shape, Vector};
 
 use crate::host::pointer::PointerEvent;
 
 /// How near the pointer must be to take a dot; points of the screen.
 const REACH: f64 = 10.0;
 /// Straight pieces that a circle is drawn of.
-pub const STEPS: usize = 72;
+const STEPS: usize = 72;
 
 /// A part of a handle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,54 +33,91 @@ pub struct Handle {
     cutter: Cutter,
     /// The middle.
     pub centre: Point,
-    /// Unit vector: the normal of a plane, the axis of a cylinder.
+    /// Unit vector: the normal of a plane or blade, the axis of a cylinder, z of a dome.
     pub axis: Vector,
-    /// Unit vectors across the axis.
+    /// Unit vectors across the axis; along width and height of a blade.
     across: [Vector; 2],
-    /// Of the disc, or of the cylinder; mm.
-    pub radius_mm: f64,
+    /// From the middle to the rim along these; the radius, or half of a blade's width and height; mm.
+    half_mm: [f64; 2],
 }
 
 impl Handle {
-    /// The handle of a cutter; a plane's disc has `disc_mm` radius. `None` for a kind without one.
+    /// The handle of a cutter; a plane's disc has `disc_mm` radius. `None` where its directions have no
+    /// length, which no cutter's have.
     pub fn of(cutter: &Cutter, disc_mm: f64) -> Option<Self> {
-        let (centre, axis, radius_mm) = match cutter {
-            Cutter::Plane { point, normal } => (*point, *normal, disc_mm),
-            Cutter::Cylinder { point, axis, radius_mm } => (*point, *axis, *radius_mm),
-            _ => return None,
+        let (centre, axis, right, half_mm) = match *cutter.shape() {
+            Shape::Plane { point, normal } => (point, normal, None, [disc_mm; 2]),
+            Shape::Cylinder { point, axis, radius_mm } => (point, axis, None, [radius_mm; 2]),
+            Shape::Dome { centre, radius_mm } => (centre, Vector::z(), None, [radius_mm; 2]),
+            Shape::Blade { point, normal, right, width_mm, height_mm } => {
+                (point, normal, Some(right), [width_mm / 2.0, height_mm / 2.0])
+            }
         };
         let axis = axis.try_normalize(0.0)?;
-        let mut seed = Vector::zeros();
-        seed[axis.iamin()] = 1.0;
-        let u = axis.cross(&seed).try_normalize(0.0)?;
-        Some(Self { cutter: *cutter, centre, axis, across: [u, axis.cross(&u)], radius_mm })
+        let right = right.unwrap_or_else(|| {
+            let mut seed = Vector::zeros();
+            seed[axis.iamin()] = 1.0;
+            axis.cross(&seed)
+        });
+        let u = (right - axis * axis.dot(&right)).try_normalize(0.0)?;
+        Some(Self { cutter: *cutter, centre, axis, across: [u, axis.cross(&u)], half_mm })
     }
 
-    fn is_plane(&self) -> bool {
-        matches!(self.cutter, Cutter::Plane { .. })
+    /// Whether it is of a plane or a blade.
+    pub fn is_flat(&self) -> bool {
+        matches!(self.cutter.shape(), Shape::Plane { .. } | Shape::Blade { .. })
     }
 
     /// A place on the circle about `centre`, by angle from the first rim dot.
     fn on_circle(&self, centre: &Point, angle_rad: f64) -> Point {
         let [u, v] = self.across;
-        centre + (u * angle_rad.cos() + v * angle_rad.sin()) * self.radius_mm
+        centre + u * (angle_rad.cos() * self.half_mm[0]) + v * (angle_rad.sin() * self.half_mm[1])
     }
 
     /// The circle, closed, shifted by `along_mm` on the axis.
-    pub fn circle(&self, along_mm: f64) -> Vec<Point> {
+    fn circle(&self, along_mm: f64) -> Vec<Point> {
         let centre = self.centre + self.axis * along_mm;
         let step = |i| self.on_circle(&centre, std::f64::consts::TAU * i as f64 / STEPS as f64);
         (0..=STEPS).map(step).collect()
     }
 
-    /// The arrow's tip.
-    pub fn tip(&self) -> Point {
-        self.centre + self.axis * (self.radius_mm * 0.8)
+    /// The edge of a plane's disc or of a blade, or a circle of the wall; closed.
+    pub fn outline(&self) -> Vec<Point> {
+        if !matches!(self.cutter.shape(), Shape::Blade { .. }) {
+            return self.circle(0.0);
+        }
+        let [u, v] = [0, 1].map(|i| self.across[i] * self.half_mm[i]);
+        [u + v, v - u, -u - v, u - v, u + v].map(|corner| self.centre + corner).to_vec()
     }
 
-    /// The dots on the rim: four for a plane, one for a cylinder.
+    /// The lines that show a round body: circles of many pieces, and straight ones along a cylinder; none of a
+    /// flat one.
+    pub fn lines(&self) -> Vec<Vec<Point>> {
+        match self.cutter.shape() {
+            Shape::Plane { .. } | Shape::Blade { .. } => Vec::new(),
+            Shape::Cylinder { .. } => {
+                let half = self.half_mm[0] * 1.5;
+                let mut lines: Vec<_> = [-half, 0.0, half].map(|along| self.circle(along)).into();
+                let ends = |wall: Point| vec![wall - self.axis * half, wall + self.axis * half];
+                lines.extend(self.circle(0.0).into_iter().step_by(STEPS / 8).map(ends));
+                lines
+            }
+            Shape::Dome { .. } => {
+                let [u, v] = self.across;
+                let turned = |axis: Vector, across: [Vector; 2]| Self { axis, across, ..*self }.circle(0.0);
+                vec![self.circle(0.0), turned(v, [u, self.axis]), turned(u, [v, self.axis])]
+            }
+        }
+    }
+
+    /// The arrow's tip.
+    pub fn tip(&self) -> Point {
+        self.centre + self.axis * (self.half_mm[0].max(self.half_mm[1]) * 0.8)
+    }
+
+    /// The dots on the rim: four for a plane or blade, one for a cylinder or dome.
     pub fn rim(&self) -> Vec<Point> {
-        let count = if self.is_plane() { 4 } else { 1 };
+        let count = if self.is_flat() { 4 } else { 1 };
         let quarter = std::f64::consts::FRAC_PI_2;
         (0..count).map(|k| self.on_circle(&self.centre, quarter * f64::from(k))).collect()
     }
@@ -87,7 +125,7 @@ impl Handle {
     /// What the pointer is on: a dot before the disc.
     pub fn grip(&self, event: &PointerEvent) -> Option<Grip> {
         let mut dots = vec![(Grip::Middle, self.centre)];
-        if self.is_plane() {
+        if self.is_flat() {
             dots.push((Grip::Along, self.tip()));
         }
         dots.extend(self.rim().into_iter().enumerate().map(|(k, p)| (Grip::Rim(k), p)));
@@ -99,42 +137,53 @@ impl Handle {
         let ray = event.ray();
         let slope = ray.direction.dot(&self.axis);
         // A disc seen almost edge on is too thin to be meant.
-        if !self.is_plane() || slope.abs() < 0.1 {
+        if !self.is_flat() || slope.abs() < 0.1 {
             return None;
         }
         let along = (self.centre - ray.origin).dot(&self.axis) / slope;
-        let inside = along > 0.0 && (ray.at(along) - self.centre).norm() <= self.radius_mm;
-        inside.then_some(Grip::Along)
+        let place = ray.at(along) - self.centre;
+        let [x, y] = [0, 1].map(|i| (place.dot(&self.across[i]) / self.half_mm[i]).abs());
+        let is_blade = matches!(self.cutter.shape(), Shape::Blade { .. });
+        let inside = if is_blade { x.max(y) <= 1.0 } else { x.hypot(y) <= 1.0 };
+        (along > 0.0 && inside).then_some(Grip::Along)
     }
 
     /// The cutter after a drag of `grip` from `began` to `now`, this handle being that of the cutter
     /// where the drag began.
     pub fn dragged(&self, grip: Grip, began: &PointerEvent, now: &PointerEvent) -> Cutter {
-        let made = match (grip, self.cutter) {
-            (Grip::Along, Cutter::Plane { normal, .. }) => {
-                self.along(began, now).map(|by| Cutter::Plane { point: self.centre + self.axis * by, normal })
+        self.moved(grip, began, now).unwrap_or(self.cutter)
+    }
+
+    fn moved(&self, grip: Grip, began: &PointerEvent, now: &PointerEvent) -> Option<Cutter> {
+        let shift = |by: Vector| self.cutter.moved(&Affine::translation(by));
+        match grip {
+            Grip::Along => Some(shift(self.axis * self.along(began, now)?)),
+            Grip::Middle if self.is_flat() => Some(shift(self.within(&self.axis, began, now)?)),
+            Grip::Middle => Some(shift(self.within(&now.lens.frame().forward, began, now)?)),
+            Grip::Rim(k) if self.is_flat() => {
+                let turn = self.turned(k, &self.across[1 - k % 2], began, now)?;
+                let shape = match *self.cutter.shape() {
+                    // About the middle: its point stays to the last bit.
+                    Shape::Plane { point, normal } => Shape::Plane { point, normal: turn.vector(&normal) },
+                    Shape::Blade { point, normal, right, width_mm, height_mm } => {
+                        let [normal, right] = [normal, right].map(|v| turn.vector(&v));
+                        Shape::Blade { point, normal, right, width_mm, height_mm }
+                    }
+                    round => round,
+                };
+                Cutter::new(shape, self.cutter.kerf_mm()).ok()
             }
-            (Grip::Middle, Cutter::Plane { normal, .. }) => self
-                .within(&self.axis, began, now)
-                .map(|by| Cutter::Plane { point: self.centre + by, normal }),
-            (Grip::Rim(k), Cutter::Plane { point, .. }) => {
-                let hinge = self.across[1 - k % 2];
-                let turn = self.turned(k, &hinge, began, now);
-                turn.map(|turn| Cutter::Plane { point, normal: turn.vector(&self.axis) })
+            Grip::Rim(_) => {
+                let reach = now.ray().closest_on_line(&self.centre, &self.across[0])?.clamp(0.5, 1e4);
+                let shape = match *self.cutter.shape() {
+                    Shape::Cylinder { point, axis, .. } => Shape::Cylinder { point, axis, radius_mm: reach },
+                    Shape::Dome { centre, .. } => Shape::Dome { centre, radius_mm: reach },
+                    flat => flat,
+                };
+                // A radius that the saw leaves nothing of is not taken.
+                Cutter::new(shape, self.cutter.kerf_mm()).ok()
             }
-            (Grip::Middle, Cutter::Cylinder { axis, radius_mm, .. }) => {
-                let forward = now.lens.frame().forward;
-                let by = self.within(&forward, began, now);
-                by.map(|by| Cutter::Cylinder { point: self.centre + by, axis, radius_mm })
-            }
-            (Grip::Rim(_), Cutter::Cylinder { point, axis, .. }) => {
-                let out = self.across[0];
-                let reach = now.ray().closest_on_line(&self.centre, &out);
-                reach.map(|r| Cutter::Cylinder { point, axis, radius_mm: r.clamp(0.5, 1e4) })
-            }
-            _ => None,
-        };
-        made.unwrap_or(self.cutter)
+        }
     }
 
     /// How far the pointer went along the axis; mm.
@@ -159,23 +208,29 @@ impl Handle {
         let across = hinge.cross(&self.axis).try_normalize(1e-9)?;
         let dot = self.rim().get(k)? - self.centre;
         let dot_rad = dot.dot(&across).atan2(dot.dot(&self.axis));
-        let start = self.nearest_rad(&across, began, dot_rad)?;
-        let end = self.nearest_rad(&across, now, dot_rad)?;
+        let start = self.nearest_rad(&across, began, dot_rad, dot.norm())?;
+        let end = self.nearest_rad(&across, now, dot_rad, dot.norm())?;
         Some(Affine::rotation_about(self.centre, *hinge, end - start))
     }
 
     /// The angle from the axis towards `across` at which the circle through both passes nearest to the
     /// pointer's ray; ties (front and back of the circle) go to the one nearer to `near_rad`.
-    fn nearest_rad(&self, across: &Vector, event: &PointerEvent, near_rad: f64) -> Option<f64> {
+    fn nearest_rad(
+        &self,
+        across: &Vector,
+        event: &PointerEvent,
+        near_rad: f64,
+        radius_mm: f64,
+    ) -> Option<f64> {
         let ray = event.ray();
         let apart = |a: f64| {
             let d = (a - near_rad).rem_euclid(std::f64::consts::TAU);
             d.min(std::f64::consts::TAU - d)
         };
         let cost = |angle: f64| {
-            let p = self.centre + (self.axis * angle.cos() + across * angle.sin()) * self.radius_mm;
+            let p = self.centre + (self.axis * angle.cos() + across * angle.sin()) * radius_mm;
             // A small preference, far below the distances that matter, decides between equals.
-            ray.distance_to(&p) + 0.02 * self.radius_mm * apart(angle)
+            ray.distance_to(&p) + 0.02 * radius_mm * apart(angle)
         };
         let step = std::f64::consts::TAU / 720.0;
         let coarse = (0..720).map(|i| f64::from(i) * step).min_by(|a, b| cost(*a).total_cmp(&cost(*b)))?;
@@ -226,7 +281,7 @@ mod tests {
         let handle = handle(Vector::new(0.3, -0.4, 2.0));
         let to = handle.tip() + handle.axis * 17.0;
         let made = handle.dragged(Grip::Along, &at(&handle.tip()), &at(&to));
-        let Cutter::Plane { point, normal } = made else { panic!("a plane stays one") };
+        let Shape::Plane { point, normal } = *made.shape() else { panic!("a plane stays one") };
         assert!((point - (handle.centre + handle.axis * 17.0)).norm() < 1e-6, "17 mm along: {point}");
         assert_eq!(normal, Vector::new(0.3, -0.4, 2.0), "not turned");
     }
@@ -236,7 +291,7 @@ mod tests {
         let handle = handle(Vector::new(0.3, -2.0, 0.5));
         let by = handle.across[0] * 11.0 - handle.across[1] * 6.0;
         let made = handle.dragged(Grip::Middle, &at(&handle.centre), &at(&(handle.centre + by)));
-        let Cutter::Plane { point, .. } = made else { panic!("a plane stays one") };
+        let Shape::Plane { point, .. } = *made.shape() else { panic!("a plane stays one") };
         assert!((point - handle.centre - by).norm() < 1e-6, "the middle followed the pointer");
         assert!((point - handle.centre).dot(&handle.axis).abs() < 1e-9, "within the plane");
     }
@@ -248,7 +303,7 @@ mod tests {
             let hinge = handle.across[1 - k % 2];
             let turn = Affine::rotation_about(handle.centre, hinge, 0.35);
             let made = handle.dragged(Grip::Rim(k), &at(from), &at(&turn.point(from)));
-            let Cutter::Plane { point, normal } = made else { panic!("a plane stays one") };
+            let Shape::Plane { point, normal } = *made.shape() else { panic!("a plane stays one") };
             assert_eq!(point, handle.centre, "the middle stays");
             let angle = normal.angle(&turn.vector(&handle.axis));
             // From some sides a circle's picture hardly moves with its angle; a tenth of a radian is then
@@ -265,7 +320,45 @@ mod tests {
         let wall = handle.rim()[0];
         let to = handle.centre + (wall - handle.centre) * 1.5;
         let made = handle.dragged(Grip::Rim(0), &at(&wall), &at(&to));
-        let Cutter::Cylinder { radius_mm, .. } = made else { panic!("a cylinder stays one") };
+        let Shape::Cylinder { radius_mm, .. } = *made.shape() else { panic!("a cylinder stays one") };
         assert!((radius_mm - 30.0).abs() < 1e-6, "{radius_mm}");
+    }
+
+    #[test]
+    fn a_dome_is_dragged_by_its_middle_and_its_wall_and_keeps_its_kerf() {
+        let dome = Cutter::dome(Point::new(10.0, 20.0, 30.0), 20.0).and_then(|c| c.with_kerf(1.2));
+        let handle = Handle::of(&dome.expect("dome"), 40.0).expect("handle");
+        let wall = handle.rim()[0];
+        let made = handle.dragged(Grip::Rim(0), &at(&wall), &at(&(wall + (wall - handle.centre) * 0.25)));
+        let Shape::Dome { centre, radius_mm } = *made.shape() else { panic!("a dome stays one") };
+        assert!((radius_mm - 25.0).abs() < 1e-6 && centre == handle.centre, "{radius_mm} about {centre}");
+        assert_eq!(made.kerf_mm(), 1.2, "the same saw");
+        let by = Vector::new(7.0, 0.0, -4.0);
+        let made = handle.dragged(Grip::Middle, &at(&handle.centre), &at(&(handle.centre + by)));
+        let Shape::Dome { centre, .. } = *made.shape() else { panic!("a dome stays one") };
+        assert!((centre - handle.centre - by).norm() < 1e-6, "with the pointer: {centre}");
+        assert!(handle.lines().iter().flatten().all(|p| ((p - handle.centre).norm() - 20.0).abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_blade_is_gripped_within_its_rectangle_and_turns_with_its_right() {
+        let (normal, right) = (Vector::new(0.0, -2.0, 1.0), Vector::new(1.0, 0.0, 0.0));
+        let blade = Cutter::blade(Point::new(10.0, 20.0, 30.0), normal, right, [80.0, 20.0]).expect("blade");
+        let handle = Handle::of(&blade, 40.0).expect("handle");
+        let [u, v] = handle.across;
+        let place = |x: f64, y: f64| handle.centre + u * x + v * y;
+        assert_eq!(handle.outline()[0], place(40.0, 10.0), "its corner");
+        assert_eq!(handle.grip(&at(&place(25.0, 5.0))), Some(Grip::Along), "on the blade");
+        assert_eq!(handle.grip(&at(&place(25.0, 16.0))), None, "above it");
+        assert_eq!(handle.grip(&at(&place(0.0, 10.0))), Some(Grip::Rim(1)), "the middle of an edge");
+        let turn = Affine::rotation_about(handle.centre, v, 0.3);
+        let from = handle.rim()[0];
+        let made = handle.dragged(Grip::Rim(0), &at(&from), &at(&turn.point(&from)));
+        let Shape::Blade { point, normal: turned, right, width_mm, height_mm } = *made.shape() else {
+            panic!("a blade stays one")
+        };
+        assert_eq!((point, width_mm, height_mm), (handle.centre, 80.0, 20.0), "the same blade");
+        assert!(turned.angle(&turn.vector(&normal)) < 0.06, "{turned}");
+        assert!(turned.dot(&right).abs() < 1e-9, "its width stays within it");
     }
 }

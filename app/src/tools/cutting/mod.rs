@@ -1,4 +1,4 @@
-//! Cutters: osteotomy planes and cylinders, set by numbers or by their handle in the 3D view.
+//! Cutters: osteotomy planes, blades, cylinders and domes, set by numbers or by their handle in the 3D view.
 
 pub mod handle;
 mod panel;
@@ -94,7 +94,7 @@ impl Tool for Cutting {
             if Some(cutter.id.as_str()) == chosen {
                 self.draw_chosen(&handle, overlay);
             } else {
-                overlay.line(handle.circle(0.0), theme::CUTTER.gamma_multiply(0.6), 1.0);
+                overlay.line(handle.outline(), theme::CUTTER.gamma_multiply(0.6), 1.0);
             }
             overlay.text(handle.centre, theme::CUTTER, &cutter.id);
         }
@@ -108,19 +108,15 @@ impl Cutting {
             Pull::Over(grip) | Pull::Dragging { grip, .. } => Some(*grip),
         };
         let color = |grip| if hot == Some(grip) { theme::HOT } else { theme::CUTTER };
-        let is_cylinder = handle.rim().len() == 1;
-        if is_cylinder {
-            let half = handle.radius_mm * 1.5;
-            for along in [-half, 0.0, half] {
-                overlay.line(handle.circle(along), theme::CUTTER, 1.5);
-            }
-            for wall in handle.circle(0.0).iter().step_by(handle::STEPS / 8) {
-                let ends = vec![wall - handle.axis * half, wall + handle.axis * half];
-                overlay.line(ends, theme::CUTTER.gamma_multiply(0.5), 1.0);
-            }
-        } else {
-            overlay.sheet(handle.circle(0.0), theme::CUTTER.gamma_multiply(0.16));
-            overlay.line(handle.circle(0.0), color(Grip::Along), 1.5);
+        for line in handle.lines() {
+            // What goes round the body is drawn stronger than what runs along it.
+            let goes_round = line.len() > 2;
+            let (strength, width) = if goes_round { (1.0, 1.5) } else { (0.5, 1.0) };
+            overlay.line(line, theme::CUTTER.gamma_multiply(strength), width);
+        }
+        if handle.is_flat() {
+            overlay.sheet(handle.outline(), theme::CUTTER.gamma_multiply(0.16));
+            overlay.line(handle.outline(), color(Grip::Along), 1.5);
             overlay.line(vec![handle.centre, handle.tip()], color(Grip::Along), 3.0);
             overlay.dot(handle.tip(), color(Grip::Along), 6.5);
         }

@@ -22,7 +22,7 @@ pub fn of_piece(grid: &Grid, pose: &Affine, transfer: &Transfer, keep: &[(Cutter
         let at = Point::from(at);
         let place = world_from_voxel.point(&at);
         all.add(&place, 1.0);
-        if keep.iter().any(|(cutter, side)| cutter.side(&place) != *side) {
+        if !keep.iter().all(|(cutter, side)| cutter.keeps(*side, &place)) {
             continue;
         }
         kept.add(&place, 1.0);

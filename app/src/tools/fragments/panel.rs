@@ -1,7 +1,7 @@
 //! The panel of the fragments.
 
 use egui::{Button, ComboBox, Ui};
-use render::volume::{Cutter, Side};
+use render::volume::{Shape, Side};
 
 use super::Fragments;
 use crate::case::{Edit, Fragment, Volume};
@@ -125,6 +125,18 @@ fn fuse_ui(tool: &mut Fragments, ctx: &mut ToolContext<'_>, ui: &mut Ui, volume:
     });
 }
 
+/// Splits one fragment by the chosen cutter, where both are now.
+fn split_chosen_ui(ctx: &mut ToolContext<'_>, ui: &mut Ui, volume: &Volume, fragment: &Fragment) {
+    let (Some(cutter), Some(corners)) = (ctx.cutter(), scene::unmoved_corners(volume, ctx.assets)) else {
+        return;
+    };
+    let button = ui.button(format!("Split it by {} where it is now", cutter.id));
+    if button.on_hover_text("The other fragments stay as they are.").clicked() {
+        let (id, cutter) = (fragment.id.clone(), cutter.id.clone());
+        ctx.edit(Edit::SplitFragment { id, cutter, corners });
+    }
+}
+
 fn chosen_ui(
     tool: &mut Fragments,
     ctx: &mut ToolContext<'_>,
@@ -144,13 +156,14 @@ fn chosen_ui(
         theme::quiet_ui(ui, "The volume is not loaded.");
         return;
     };
+    split_chosen_ui(ctx, ui, volume, fragment);
     let centre = tool.middle(ctx, volume, &grid, fragment);
     // The direction of the chosen cutter, where this fragment was cut by it.
     let offered = ctx.cutter().filter(|c| fragment.keep.contains_key(&c.id)).and_then(|c| {
-        let axis = match c.cutter {
-            Cutter::Plane { normal, .. } => normal,
-            Cutter::Cylinder { axis, .. } => axis,
-            _ => return None,
+        let axis = match *c.cutter.shape() {
+            Shape::Plane { normal, .. } | Shape::Blade { normal, .. } => normal,
+            Shape::Cylinder { axis, .. } => axis,
+            Shape::Dome { .. } => return None,
         };
         Some((c.id.as_str(), fragment.pose.vector(&axis)))
     });

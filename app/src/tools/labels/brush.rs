@@ -58,7 +58,7 @@ impl Stroke {
                     let sample = Point::new(x as f64, y as f64, z as f64);
                     let there = unmoved_from_voxel.point(&sample);
                     let in_ball = (there - centre).norm() <= radius_mm || sample == nearest;
-                    if in_ball && self.piece.keep.iter().all(|(cutter, side)| cutter.side(&there) == *side) {
+                    if in_ball && self.piece.keep.iter().all(|(cutter, side)| cutter.keeps(*side, &there)) {
                         self.put(labels, [x, y, z], label, into);
                     }
                 }

@@ -24,7 +24,7 @@ use crate::{shader, target};
 /// Fragments that one draw integrates together. More would be exact for more, but a software driver takes
 /// 9 s to compile a shader of 4, and 107 s of 8.
 pub(crate) const SLOTS: usize = 4;
-/// Cylinders whose outside one fragment may keep.
+/// Cylinders, domes and blades whose outside one fragment may keep.
 pub(crate) const MAX_GAPS: usize = 8;
 /// Slabs between two looks for finished pixels.
 const SATURATE_EVERY: u32 = 6;
@@ -60,18 +60,23 @@ pub(crate) mod gpu_data {
         pub(crate) unit_mm: f32,
         pub(crate) plane_first: u32,
         pub(crate) plane_end: u32,
-        pub(crate) cylinder_first: u32,
-        pub(crate) cylinder_end: u32,
+        pub(crate) round_first: u32,
+        pub(crate) round_end: u32,
+        pub(crate) block_first: u32,
+        pub(crate) block_end: u32,
+        pub(crate) pad_0: u32,
+        pub(crate) pad_1: u32,
         pub(crate) channel: [f32; 4],
         pub(crate) stack: [f32; 4],
     }
 
-    /// `Cylinder`.
+    /// `Round`.
     #[repr(C)]
     #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-    pub(crate) struct Cylinder {
+    pub(crate) struct Round {
         pub(crate) u: Form,
         pub(crate) v: Form,
+        pub(crate) w: Form,
         pub(crate) radius_mm: f32,
         pub(crate) outside: u32,
         pub(crate) pad_0: u32,
@@ -85,7 +90,7 @@ pub(crate) struct Inputs<'a> {
     pub(crate) stack: &'a Stack,
     pub(crate) fragments: &'a [gpu_data::Fragment],
     pub(crate) planes: &'a [crate::view::Form],
-    pub(crate) cylinders: &'a [gpu_data::Cylinder],
+    pub(crate) rounds: &'a [gpu_data::Round],
     pub(crate) tables: &'a [[f32; 4]],
     pub(crate) textures: &'a [Arc<VolumeTexture>],
 }
@@ -196,10 +201,10 @@ impl Slabs {
     ) -> Result<Prepared, GpuError> {
         let storage = wgpu::BufferUsages::STORAGE;
         let components: Vec<[u32; SLOTS]> = inputs.stack.components.clone();
-        let [fragments, planes, cylinders, components] = [
+        let [fragments, planes, rounds, components] = [
             upload(gpu, "slabs.fragments", bytemuck::cast_slice(inputs.fragments), storage),
             upload(gpu, "slabs.planes", bytemuck::cast_slice(inputs.planes), storage),
-            upload(gpu, "slabs.cylinders", bytemuck::cast_slice(inputs.cylinders), storage),
+            upload(gpu, "slabs.rounds", bytemuck::cast_slice(inputs.rounds), storage),
             upload(gpu, "slabs.components", bytemuck::cast_slice(&components), storage),
         ];
         let table = upload_tables(gpu, inputs.tables);
@@ -209,7 +214,7 @@ impl Slabs {
             entries: &[
                 entry(0, fragments.as_entire_binding()),
                 entry(1, planes.as_entire_binding()),
-                entry(2, cylinders.as_entire_binding()),
+                entry(2, rounds.as_entire_binding()),
                 entry(3, components.as_entire_binding()),
                 entry(4, wgpu::BindingResource::TextureView(&table)),
             ],
@@ -238,7 +243,8 @@ impl Slabs {
         } else {
             (bind_surfaces(unused), None)
         };
-        let gaps = inputs.cylinders.iter().any(|c| c.outside == 1);
+        let gaps = inputs.rounds.iter().any(|r| r.outside == 1)
+            || inputs.fragments.iter().any(|f| f.block_first < f.block_end);
         let mut groups: BTreeMap<[usize; SLOTS], wgpu::BindGroup> = BTreeMap::new();
         let mut draws = Vec::with_capacity(inputs.stack.draws.len());
         for draw in &inputs.stack.draws {

@@ -2,7 +2,7 @@
 // fragments, and the pixel integrates its own piece of the ray through them.
 //
 // A slab is cut into sub-steps. In each, a fragment contributes exactly the part of the sub-step that its
-// planes and cylinders leave it; the scalar is taken as linear along that part, and extinction and
+// cutters leave it; the scalar is taken as linear along that part, and extinction and
 // extinction x colour are integrated exactly from their antiderivatives (pre-integration with a table of
 // one dimension; Engel 2001, Lum 2004; Weiler 2003 for the antiderivative). Overlapping fragments add up
 // before the exponential. Surfaces split the sub-step at their own depth.
@@ -33,17 +33,23 @@ struct Fragment {
     unit_mm: f32,
     plane_first: u32,
     plane_end: u32,
-    cylinder_first: u32,
-    cylinder_end: u32,
+    round_first: u32,
+    round_end: u32,
+    // Among the planes: five for each block whose outside is kept.
+    block_first: u32,
+    block_end: u32,
+    pad_0: u32,
+    pad_1: u32,
     // What each channel of a texel adds to the value; x and y of `stack`: slices and layers of three slices each.
     channel: vec4<f32>,
     stack: vec4<f32>,
 }
 
-struct Cylinder {
-    // Two directions across the axis, mm from it.
+struct Round {
+    // mm from the axis along two directions across it, and nothing; or from the centre of a ball along three.
     u: Form,
     v: Form,
+    w: Form,
     radius_mm: f32,
     // 1: the outside is kept; 0: the inside.
     outside: u32,
@@ -51,6 +57,9 @@ struct Cylinder {
     pad_1: u32,
 }
 
+
+// Beyond every place of a stack, mm.
+const FAR: f32 = 1e30;
 
 struct Component {
     fragments: array<u32, 4>,
@@ -64,7 +73,7 @@ struct Component {
 
 @group(2) @binding(0) var<storage, read> fragments: array<Fragment>;
 @group(2) @binding(1) var<storage, read> planes: array<Form>;
-@group(2) @binding(2) var<storage, read> cylinders: array<Cylinder>;
+@group(2) @binding(2) var<storage, read> rounds: array<Round>;
 @group(2) @binding(3) var<storage, read> components: array<Component>;
 @group(2) @binding(4) var transfer_table: texture_2d<f32>;
 
@@ -81,7 +90,7 @@ override KIND_0: u32 = 0u;
 override KIND_1: u32 = 0u;
 override KIND_2: u32 = 0u;
 override KIND_3: u32 = 0u;
-// Whether any fragment keeps the outside of a cylinder.
+// Whether any fragment keeps the outside of a round body or a block.
 override GAPS: bool = false;
 // Whether surfaces may lie in the slab, and whether any of the picture's is translucent.
 override SURFACES: bool = false;
@@ -124,6 +133,7 @@ struct Slot {
     position: f32,
     high: vec4<f32>,
     low: vec4<f32>,
+    // What is cut out, of which no two overlap; as many in every pixel, those that are not met without length.
     gap_count: u32,
     gaps: array<vec2<f32>, 8>,
 }
@@ -132,52 +142,82 @@ fn along(form: Form, e: vec3<f32>) -> vec2<f32> {
     return vec2<f32>(dot(form.at_near.xyz, e), dot(form.per_mm.xyz, e));
 }
 
-// The part of [z0, z1] that a fragment's planes and inner cylinders keep, and the gaps of the others.
+// What of a stretch lies where a form is positive.
+fn clipped(stretch: vec2<f32>, line: vec2<f32>) -> vec2<f32> {
+    let crossing = -line.x / line.y;
+    if line.y > 0.0 {
+        return vec2<f32>(max(stretch.x, crossing), stretch.y);
+    } else if line.y < 0.0 {
+        return vec2<f32>(stretch.x, min(stretch.y, crossing));
+    } else if line.x < 0.0 {
+        return vec2<f32>(stretch.x, stretch.x);
+    }
+    return stretch;
+}
+
+// The stretch within a round body; none where it ends before it starts.
+fn inside_round(u: vec2<f32>, v: vec2<f32>, w: vec2<f32>, radius: f32) -> vec2<f32> {
+    let a = u.y * u.y + v.y * v.y + w.y * w.y;
+    let b = u.x * u.y + v.x * v.y + w.x * w.y;
+    let across = vec3<f32>(u.x * v.y - u.y * v.x, v.x * w.y - v.y * w.x, w.x * u.y - w.y * u.x);
+    let discriminant = radius * radius * a - dot(across, across);
+    if a > 1e-12 {
+        if discriminant > 0.0 {
+            let root = sqrt(discriminant);
+            return vec2<f32>(-b - root, -b + root) / a;
+        }
+    } else if u.x * u.x + v.x * v.x + w.x * w.x < radius * radius {
+        return vec2<f32>(-FAR, FAR);
+    }
+    return vec2<f32>(1.0, 0.0);
+}
+
+// Adds a stretch to what is cut out. It becomes one with those that it overlaps, so that nothing counts twice.
+fn add_gap(slot: ptr<function, Slot>, stretch: vec2<f32>) {
+    var gap = select(vec2<f32>(0.0), stretch, stretch.x < stretch.y);
+    for (var i = 0u; i < (*slot).gap_count; i++) {
+        let other = (*slot).gaps[i];
+        if other.x < other.y && gap.x < gap.y && other.x <= gap.y && gap.x <= other.y {
+            gap = vec2<f32>(min(gap.x, other.x), max(gap.y, other.y));
+            (*slot).gaps[i] = vec2<f32>(0.0);
+        }
+    }
+    (*slot).gaps[(*slot).gap_count] = gap;
+    (*slot).gap_count++;
+}
+
+// The part of [z0, z1] that a fragment's planes and inner round bodies keep, and the gaps of the others.
 fn open_slot(id: u32, e: vec3<f32>, z0: f32, z1: f32) -> Slot {
     var slot: Slot;
-    slot.start = z0;
-    slot.end = z1;
+    var open = vec2<f32>(z0, z1);
     for (var i = fragments[id].plane_first; i < fragments[id].plane_end; i++) {
-        let line = along(planes[i], e);
-        let crossing = -line.x / line.y;
-        if line.y > 0.0 {
-            slot.start = max(slot.start, crossing);
-        } else if line.y < 0.0 {
-            slot.end = min(slot.end, crossing);
-        } else if line.x < 0.0 {
-            slot.end = slot.start;
-        }
+        open = clipped(open, along(planes[i], e));
     }
-    for (var i = fragments[id].cylinder_first; i < fragments[id].cylinder_end; i++) {
-        let u = along(cylinders[i].u, e);
-        let v = along(cylinders[i].v, e);
-        let radius = cylinders[i].radius_mm;
-        let a = u.y * u.y + v.y * v.y;
-        let b = u.x * u.y + v.x * v.y;
-        let across = u.x * v.y - u.y * v.x;
-        let discriminant = radius * radius * a - across * across;
-        var inside = vec2<f32>(1.0, 0.0);
-        if a > 1e-12 {
-            if discriminant > 0.0 {
-                let root = sqrt(discriminant);
-                inside = vec2<f32>(-b - root, -b + root) / a;
-            }
-        } else if u.x * u.x + v.x * v.x < radius * radius {
-            inside = vec2<f32>(z0, z1);
-        }
-        if cylinders[i].outside == 0u {
-            slot.start = max(slot.start, inside.x);
-            slot.end = min(slot.end, inside.y);
+    for (var i = fragments[id].round_first; i < fragments[id].round_end; i++) {
+        let u = along(rounds[i].u, e);
+        let v = along(rounds[i].v, e);
+        let w = along(rounds[i].w, e);
+        let inside = inside_round(u, v, w, rounds[i].radius_mm);
+        if rounds[i].outside == 0u {
+            open = vec2<f32>(max(open.x, inside.x), min(open.y, inside.y));
             if inside.y < inside.x {
-                slot.end = slot.start;
+                open.y = open.x;
             }
-        } else if GAPS && inside.x < inside.y && inside.y > z0 && inside.x < z1 {
-            slot.gaps[slot.gap_count] = inside;
-            slot.gap_count++;
+        } else if GAPS {
+            add_gap(&slot, inside);
         }
     }
-    slot.start = min(slot.start, z1);
-    slot.end = max(slot.start, slot.end);
+    if GAPS {
+        for (var i = fragments[id].block_first; i < fragments[id].block_end; i += 5u) {
+            var inside = vec2<f32>(-FAR, FAR);
+            for (var face = 0u; face < 5u; face++) {
+                inside = clipped(inside, along(planes[i + face], e));
+            }
+            add_gap(&slot, inside);
+        }
+    }
+    slot.start = min(open.x, z1);
+    slot.end = max(slot.start, open.y);
     let u = along(fragments[id].u, e);
     let v = along(fragments[id].v, e);
     let w = along(fragments[id].w, e);
@@ -258,24 +298,28 @@ fn begin(kind: u32, slot: ptr<function, Slot>, id: u32, volume: texture_3d<f32>)
     }
 }
 
-// The length of [a, b] that the slot's gaps leave.
-fn kept_length(slot: ptr<function, Slot>, a: f32, b: f32) -> f32 {
+// What the slot's gaps leave of [a, b]: where it starts, where it ends, and how much of that is kept.
+fn kept(slot: ptr<function, Slot>, a: f32, b: f32) -> vec3<f32> {
     var start = a;
     var end = b;
+    for (var i = 0u; i < (*slot).gap_count; i++) {
+        let gap = (*slot).gaps[i];
+        if gap.x <= a && gap.y > a {
+            start = min(gap.y, b);
+        }
+        if gap.x < b && gap.y >= b {
+            end = max(gap.x, a);
+        }
+    }
     var inner = 0.0;
     for (var i = 0u; i < (*slot).gap_count; i++) {
         let gap = (*slot).gaps[i];
-        if gap.x <= start && gap.y >= end {
-            end = start;
-        } else if gap.x <= start && gap.y > start {
-            start = gap.y;
-        } else if gap.y >= end && gap.x < end {
-            end = gap.x;
-        } else if gap.x > start && gap.y < end {
-            inner += gap.y - gap.x;
-        }
+        inner += max(0.0, min(gap.y, end) - max(gap.x, start));
     }
-    return max(0.0, end - start - inner);
+    if start >= end {
+        return vec3<f32>(a, b, 0.0);
+    }
+    return vec3<f32>(start, end, max(0.0, end - start - inner));
 }
 
 // |n·v| of the gradient at a place, or -1 where the field is flat.
@@ -308,15 +352,18 @@ fn advance(
     let b = clamp(zeta, (*slot).start, (*slot).end);
     let a = (*slot).zeta;
     (*slot).zeta = b;
-    var span = b - a;
+    var part = vec3<f32>(a, b, b - a);
     if GAPS {
-        span = kept_length(slot, a, b);
+        part = kept(slot, a, b);
     }
+    // Where a gap takes an end of the step, the values there: they are linear along it.
+    let trimmed = GAPS && (part.x != a || part.y != b);
+    let shares = (part.xy - a) / max(b - a, 1e-30);
     let at = place(slot, b);
     var mean: vec4<f32>;
     if kind == KIND_COLOR {
         let here = extinction_of(textureSampleLevel(volume, linear, at, 0.0), fragments[id].unit_mm);
-        mean = 0.5 * ((*slot).high + here);
+        mean = mix((*slot).high, here, select(0.5, 0.5 * (shares.x + shares.y), trimmed));
         (*slot).high = here;
     } else {
         let row = fragments[id].table_row;
@@ -326,23 +373,33 @@ fn advance(
         var low: vec4<f32>;
         antiderivative(here, row, &high, &low);
         let last = f32(textureDimensions(transfer_table).x) - 1.0;
-        let beyond = min(before, here) >= last || max(before, here) <= 0.0;
-        if abs(here - before) > 1.0 && !beyond {
-            mean = ((high - (*slot).high) + (low - (*slot).low)) / (here - before);
+        var ends = vec2<f32>(before, here);
+        var start_high = (*slot).high;
+        var start_low = (*slot).low;
+        var end_high = high;
+        var end_low = low;
+        if trimmed {
+            ends = before + (here - before) * shares;
+            antiderivative(ends.x, row, &start_high, &start_low);
+            antiderivative(ends.y, row, &end_high, &end_low);
+        }
+        let beyond = min(ends.x, ends.y) >= last || max(ends.x, ends.y) <= 0.0;
+        if abs(ends.y - ends.x) > 1.0 && !beyond {
+            mean = ((end_high - start_high) + (end_low - start_low)) / (ends.y - ends.x);
         } else {
-            mean = classify(0.5 * (before + here), row);
+            mean = classify(0.5 * (ends.x + ends.y), row);
         }
         (*slot).position = here;
         (*slot).high = high;
         (*slot).low = low;
         if (kind == KIND_SCALAR_LIT || kind == KIND_STACKED_LIT) && mean.a > 0.0 {
-            let toward = facing(kind, id, volume, place(slot, 0.5 * (a + b)), ray.xyz);
+            let toward = facing(kind, id, volume, place(slot, 0.5 * (part.x + part.y)), ray.xyz);
             if toward >= 0.0 {
                 mean = vec4<f32>(lit(mean.rgb / mean.a, toward) * mean.a, mean.a);
             }
         }
     }
-    return max(mean, vec4<f32>(0.0)) * (span * ray.w);
+    return max(mean, vec4<f32>(0.0)) * (part.z * ray.w);
 }
 
 // The nearest layer of a pixel at or behind `zeta`.

@@ -12,7 +12,7 @@ fn lit(color: [f64; 3], facing: f64) -> [f64; 3] {
 /// Colour and extinction of one piece at a place, if it is there.
 fn at(item: &VolumeItem, piece: &Piece, p: &Point, direction: &Vector) -> Option<([f64; 3], f64)> {
     let unmoved = piece.pose.inverse().point(p);
-    if !piece.keep.iter().all(|(cutter, side)| cutter.side(&unmoved) == *side) {
+    if !piece.keep.iter().all(|(cutter, side)| cutter.keeps(*side, &unmoved)) {
         return None;
     }
     let world_from_voxel = piece.pose * item.pose * *item.grid.world_from_voxel();
@@ -100,13 +100,18 @@ fn everything() -> Scene {
     let mut first = volume(noisy([13, 12, 9]), steep());
     first.shading = Shading::Lit;
     let plane = Cutter::plane(Point::new(0.0, 0.5, 0.0), Vector::new(0.3, 1.0, 0.2)).expect("plane");
+    let plane = plane.with_kerf(0.4).expect("kerf");
     let tube = Cutter::cylinder(Point::origin(), Vector::new(0.2, 0.1, 1.0), 3.5).expect("tube");
+    let dome = Cutter::dome(Point::new(1.0, 1.5, 0.5), 2.5).expect("dome");
+    let blade =
+        Cutter::blade(Point::new(0.5, -1.0, 1.0), Vector::z(), Vector::new(1.0, 0.4, 0.0), [3.0, 4.0])
+            .expect("blade");
     let turn = Affine::rotation_about(Point::new(2.0, 3.0, 0.0), Vector::new(0.0, 0.3, 1.0), 0.5);
     let away = turn * Affine::translation(Vector::new(1.0, 4.0, 0.5));
     first.pieces = vec![
         Piece { keep: vec![(plane, Side::Minus), (tube, Side::Minus)], pose: Affine::identity() },
         Piece { keep: vec![(plane, Side::Minus), (tube, Side::Plus)], pose: Affine::identity() },
-        Piece { keep: vec![(plane, Side::Plus)], pose: away },
+        Piece { keep: vec![(plane, Side::Plus), (dome, Side::Plus), (blade, Side::Plus)], pose: away },
     ];
     let mut second = volume(
         noisy([7, 9, 8]),

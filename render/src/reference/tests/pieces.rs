@@ -7,11 +7,14 @@ fn piece(keep: &[(Cutter, Side)]) -> Piece {
     Piece { keep: keep.to_vec(), pose: Affine::identity() }
 }
 
-fn cutters() -> [Cutter; 3] {
+fn cutters() -> [Cutter; 5] {
     [
         Cutter::plane(Point::new(-2.0, 0.3, 0.0), Vector::new(1.0, 0.4, -0.3)).expect("plane"),
         Cutter::plane(Point::new(0.0, 1.0, -1.0), Vector::new(-0.2, 1.0, 0.7)).expect("plane"),
         Cutter::cylinder(Point::new(-1.0, 0.0, 1.0), Vector::new(0.3, 1.0, 0.4), 3.0).expect("cylinder"),
+        Cutter::dome(Point::new(1.0, 0.5, -1.0), 4.0).expect("dome"),
+        Cutter::blade(Point::new(1.0, 0.0, 1.0), Vector::new(0.2, -0.3, 1.0), Vector::x(), [5.0, 4.0])
+            .expect("blade"),
     ]
 }
 
@@ -29,7 +32,7 @@ fn a_volume_cut_in_pieces_that_stay_draws_as_the_whole() {
         item.pieces.clear();
         for sides in 0..8 {
             let side = |bit: usize| if sides >> bit & 1 == 1 { Side::Plus } else { Side::Minus };
-            let keep: Vec<_> = cutters().into_iter().enumerate().map(|(i, c)| (c, side(i))).collect();
+            let keep: Vec<_> = cutters()[..3].iter().enumerate().map(|(i, c)| (*c, side(i))).collect();
             item.pieces.push(piece(&keep));
         }
         let cut = pixels(&scene(vec![item.clone()], Vec::new(), camera()), [24, 20]);
@@ -69,6 +72,42 @@ fn a_cylinder_keeps_its_chord_and_leaves_the_rest() {
             let alpha = 1.0 - (-tau * length).exp();
             assert!((pixel[3] - alpha).abs() < 1e-12, "{side:?} {off} mm off the axis: {}", pixel[3]);
         }
+    }
+}
+
+/// A block of 21 mm, seen along y, of which each ray has `length(off)` for its distance from x = z = 10.
+fn is_as_long_as(keep: &[(Cutter, Side)], what: &str, length: impl Fn(f64, f64) -> f64) {
+    let tau = -(0.95_f64.ln());
+    let mut item = block([21, 21, 21], [1.0, 1.0, 1.0, 0.05]);
+    item.pieces = vec![piece(keep)];
+    let camera = parallel(Point::new(10.0, -30.0, 10.0), Point::new(10.0, 0.0, 10.0), 12.0);
+    let size = [24, 24];
+    let all = pixels(&scene(vec![item], Vec::new(), camera), size);
+    for (pixel, (start, _)) in all.iter().zip(rays(&camera, size)) {
+        let (x, z) = (start.x - 10.0, start.z - 10.0);
+        let alpha = 1.0 - (-tau * length(x, z)).exp();
+        assert!((pixel[3] - alpha).abs() < 1e-12, "{what} at {x} {z}: {} is not {alpha}", pixel[3]);
+    }
+}
+
+#[test]
+fn domes_blades_and_kerfs_leave_as_much_of_a_ray_as_their_shape_says() {
+    let middle = Point::new(10.0, 10.0, 10.0);
+    let chord = |r: f64, x: f64, z: f64| 2.0 * (r * r - x * x - z * z).max(0.0).sqrt();
+    let dome = Cutter::dome(middle, 4.0).and_then(|c| c.with_kerf(1.0)).expect("dome");
+    is_as_long_as(&[(dome, Side::Minus)], "inside a dome", |x, z| chord(3.5, x, z));
+    is_as_long_as(&[(dome, Side::Plus)], "outside a dome", |x, z| 21.0 - chord(4.5, x, z));
+    let tube = Cutter::cylinder(middle, Vector::x(), 4.0).and_then(|c| c.with_kerf(1.0)).expect("tube");
+    is_as_long_as(&[(tube, Side::Plus)], "outside a tube", |_, z| 21.0 - chord(4.5, 0.0, z));
+    // The blade faces the eye, in the middle of the block: it has passed what is behind it.
+    let blade = Cutter::blade(middle, -Vector::y(), Vector::new(0.0, 1.0, 2.0), [5.0, 3.0]);
+    let blade = blade.and_then(|c| c.with_kerf(0.5)).expect("blade");
+    let within = |x: f64, z: f64| z.abs() < 2.5 && x.abs() < 1.5;
+    is_as_long_as(&[(blade, Side::Minus)], "a blade", |x, z| if within(x, z) { 10.25 } else { 0.0 });
+    is_as_long_as(&[(blade, Side::Plus)], "around it", |x, z| if within(x, z) { 10.25 } else { 21.0 });
+    let plane = Cutter::plane(middle, Vector::y() * 3.0).and_then(|c| c.with_kerf(2.0)).expect("plane");
+    for side in [Side::Plus, Side::Minus] {
+        is_as_long_as(&[(plane, side)], "a plane with a kerf", |_, _| 9.5);
     }
 }
 
