@@ -7,6 +7,7 @@ use std::sync::Arc;
 use render::volume::{Grid, TriangleMesh};
 use thiserror::Error;
 
+use super::cuts::Cuts;
 use super::{Case, Implant, Source, Volume};
 use crate::load::{self, Content, Item, Limits, LoadError, Note, Progress};
 use crate::sample;
@@ -123,6 +124,7 @@ pub enum AssetError {
 #[derive(Debug, Clone, Default)]
 pub struct Assets {
     loaded: BTreeMap<Key, Arc<Asset>>,
+    cuts: Cuts,
 }
 
 impl Assets {
@@ -149,6 +151,11 @@ impl Assets {
             Data::Mesh(mesh) => Some(mesh),
             Data::Grid(_) | Data::Steps(_) => None,
         }
+    }
+
+    /// What cutters leave of the surfaces.
+    pub fn cuts(&self) -> &Cuts {
+        &self.cuts
     }
 
     /// Everything known about some data, where loaded.

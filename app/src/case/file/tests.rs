@@ -13,7 +13,7 @@ const FULL: &str = r#"{
   "cutters": [{"id": "c1", "plane": {"point": [1,2,3], "normal": [0,0,2], "extent": 40}, "note": "a"},
               {"id": "c2", "cylinder": {"point": [0,0,0], "axis": [0,1,0], "radius_mm": 40.5}}],
   "fragments": [{"id": "head", "volume": "ct", "keep": {"c2": "-", "c1": "+"}, "goal": "medial"}],
-  "implants": [{"id": "stem", "source": "builtin:hip/stem", "scale": 1000, "color": [1,0,0.5], "opacity": 0.5,
+  "implants": [{"id": "stem", "source": "builtin:hip/stem", "scale": 1000, "keep": {"c1": "-"}, "color": [1,0,0.5], "opacity": 0.5,
                 "lot": 7}],
   "camera": {"eye": [0,-500,0], "target": [0,0,0], "up": [0,0,1], "parallel_mm": 300, "lens": "x"},
   "background": [0, 0.5, 1]
@@ -51,6 +51,7 @@ fn a_round_trip_keeps_everything_unknown_keys_too() {
         "/fragments/0/goal",
         "/fragments/0/keep",
         "/implants/0/lot",
+        "/implants/0/keep",
         "/implants/0/source",
         "/camera/lens",
     ] {
@@ -141,6 +142,8 @@ fn every_broken_field_is_named_with_its_fault() {
         ("/fragments/0/keep/c9", "\"+\"", "fragments[0].keep.c9", "not among the cutters"),
         ("/fragments/0/keep/c1", "\"plus\"", "fragments[0].keep.c1", "not a side"),
         ("/fragments/0/keep", "[]", "fragments[0].keep", "not an object"),
+        ("/implants/0/keep/c9", "\"+\"", "implants[0].keep.c9", "not among the cutters"),
+        ("/implants/0/keep/c1", "true", "implants[0].keep.c1", "not a side"),
         ("/implants/0/scale", "0", "implants[0].scale", "not more than 0"),
         ("/implants/0/opacity", "1.5", "implants[0].opacity", "between 0 and 1"),
         ("/implants/0/color", "[0,0,9]", "implants[0].color", "0 to 1"),

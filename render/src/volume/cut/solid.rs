@@ -138,7 +138,7 @@ fn half_angle(radius_mm: f64, sagitta_mm: f64) -> Option<f64> {
 
 /// Unit vectors spread over the sphere: an icosahedron's faces divided into `parts` along each edge.
 fn directions(parts: usize) -> Vec<Vector> {
-    let g = (1.0 + 5.0_f64.sqrt()) / 2.0;
+    let g = f64::midpoint(1.0, 5.0_f64.sqrt());
     let mut corners = Vec::with_capacity(12);
     for (a, b) in [(1.0, g), (-1.0, g), (1.0, -g), (-1.0, -g)] {
         corners.extend([Vector::new(0.0, a, b), Vector::new(a, b, 0.0), Vector::new(b, 0.0, a)]);

@@ -1,5 +1,7 @@
 //! Planes: through nothing in particular, through vertices, edges and faces; open and broken meshes.
 
+use std::collections::HashMap;
+
 use super::shapes::{
     Dice, area_in, ball, check_halves, cube, edges, made, snapped, stem, together, torus, volume,
 };
@@ -276,6 +278,54 @@ fn the_rim_of_an_opening_in_the_plane_is_no_cut() {
     assert_eq!(parts.minus.expect("below").triangles(), open.triangles(), "and no lid");
 }
 
+/// Triangles of a binary STL file, corners at one place being one vertex.
+fn stl(bytes: &[u8]) -> TriangleMesh {
+    let mut known: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut positions = Vec::new();
+    let mut corner = |bytes: &[u8]| {
+        let numbers = [0, 4, 8].map(|i| f32::from_le_bytes(bytes[i..i + 4].try_into().expect("four bytes")));
+        *known.entry(numbers.map(f32::to_bits)).or_insert_with(|| {
+            positions.push(Point::from(numbers.map(f64::from)));
+            positions.len() as u32 - 1
+        })
+    };
+    let faces = bytes[84..].chunks_exact(50);
+    let triangles = faces.map(|face| [12, 24, 36].map(|at| corner(&face[at..]))).collect();
+    made(positions, triangles)
+}
+
+/// Bones and implants as scanned and as designed; one of them is open, one inside out.
+#[test]
+fn real_surfaces_are_cut_like_made_ones() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/mesh");
+    let Ok(files) = std::fs::read_dir(&folder) else {
+        println!("not tested: there is no {}", folder.display());
+        return;
+    };
+    let mut paths: Vec<_> = files.flatten().map(|entry| entry.path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|e| e == "stl"));
+    paths.sort();
+    let mut dice = Dice::new(17);
+    let mut closed = 0;
+    for path in &paths {
+        let mesh = stl(&std::fs::read(path).expect("a file"));
+        let is_closed = edges(&mesh).unmatched == 0;
+        closed += usize::from(is_closed);
+        for choice in CHOICES {
+            for _ in 0..6 {
+                let Some(plane) = choice(&mesh, &mut dice) else { continue };
+                let parts = by_plane(&mesh, &plane).expect("cut");
+                if is_closed {
+                    check_halves(&mesh, &plane, &parts);
+                }
+                let kept = [parts.plus, parts.minus].into_iter().flatten().map(|m| m.triangles().len());
+                assert!(kept.sum::<usize>() >= mesh.triangles().len(), "no triangle is lost");
+            }
+        }
+    }
+    assert!(closed >= 4, "{closed} of {} are closed", paths.len());
+}
+
 #[test]
 fn broken_meshes_do_not_disturb() {
     let mut dice = Dice::new(3);
@@ -300,7 +350,7 @@ fn ragged_outlines_are_covered_without_overlap() {
     let n = 3000_u32;
     let star = |i: u32| {
         let angle = std::f64::consts::TAU * f64::from(i) / f64::from(n);
-        let r = if i % 2 == 0 { 3.0 } else { 1.0 } + 0.5 * dice.number();
+        let r = if i.is_multiple_of(2) { 3.0 } else { 1.0 } + 0.5 * dice.number();
         Point::new(r * angle.cos(), r * angle.sin(), 0.0)
     };
     let low: Vec<Point> = (0..n).map(star).collect();

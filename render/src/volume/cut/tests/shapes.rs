@@ -63,8 +63,7 @@ pub(super) fn cube(n: usize) -> TriangleMesh {
     made(positions, triangles)
 }
 
-/// Rings of `around` places, `along` of them, closed by a pole at each end where `is_open` is false, else onto
-/// themselves.
+/// Rings of `around` places, `along` of them, joined to a ring themselves or closed by a pole at each end.
 fn lofted(along: usize, around: usize, is_ring: bool, at: impl Fn(f64, f64) -> Point) -> TriangleMesh {
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
@@ -129,7 +128,7 @@ pub(super) fn together(parts: &[(&TriangleMesh, Vector, f64)], flip: bool) -> Tr
         positions.extend(mesh.positions().iter().map(|p| Point::from(p.coords * scale.abs() + shift)));
         // A scale below zero stands for a void: the surface turned inside out.
         triangles.extend(mesh.triangles().iter().map(|&[a, b, c]| {
-            let t = if (*scale < 0.0) != flip { [a, c, b] } else { [a, b, c] };
+            let t = if (*scale < 0.0) == flip { [a, b, c] } else { [a, c, b] };
             t.map(|v| v + first)
         }));
     }
