@@ -8,6 +8,7 @@ use std::sync::Arc;
 use render::scene::{Camera, Labels, MeshItem, Piece, Projection, Scene, VolumeItem};
 use render::volume::{Affine, Point, Vector};
 
+use crate::case::cuts::Cut;
 use crate::case::labels::{LabelSet, MAX_LABEL};
 use crate::case::{Assets, Case, Implant, Volume};
 
@@ -17,7 +18,7 @@ pub const DEFAULT_FOV_DEG: f64 = 30.0;
 /// What a case shows.
 pub fn scene(case: &Case, assets: &Assets) -> Scene {
     let volumes: Vec<VolumeItem> = case.volumes.iter().filter_map(|v| volume(case, v, assets)).collect();
-    let meshes: Vec<MeshItem> = case.implants.iter().filter_map(|i| implant(i, assets)).collect();
+    let meshes: Vec<MeshItem> = case.implants.iter().filter_map(|i| implant(case, i, assets)).collect();
     let camera = case.camera.unwrap_or_else(|| {
         let bounds = bounds(&volumes, &meshes).unwrap_or([Point::from([-100.0; 3]), Point::from([100.0; 3])]);
         fit(bounds, Vector::y(), Vector::z())
@@ -67,17 +68,23 @@ fn colors(set: &LabelSet, most: u32) -> Arc<[[f64; 4]]> {
     std::iter::once([0.0; 4]).chain((1..=most).map(|label| set.color(label))).collect()
 }
 
-fn implant(implant: &Implant, assets: &Assets) -> Option<MeshItem> {
+fn implant(case: &Case, implant: &Implant, assets: &Assets) -> Option<MeshItem> {
     if !implant.visible || implant.opacity == 0.0 {
         return None;
     }
     Some(MeshItem {
-        mesh: Arc::clone(assets.mesh(implant)?),
+        mesh: implant_cut(case, implant, assets)?.mesh?,
         pose: world_from_model(implant),
         color: implant.color,
         opacity: implant.opacity,
         shading: implant.shading,
     })
+}
+
+/// What the cutters leave of an implant in its place, where its surface is loaded; in the model's own frame.
+pub fn implant_cut(case: &Case, implant: &Implant, assets: &Assets) -> Option<Cut> {
+    let mesh = assets.mesh(implant)?;
+    Some(assets.cuts().cut(&implant.id, mesh, &world_from_model(implant), case.sides(&implant.keep)))
 }
 
 /// Where the model's own coordinates lie: its pose after its scale.
@@ -195,6 +202,32 @@ mod tests {
         assert_eq!(scene(&case, &assets).volumes[0].pieces.len(), 1, "the other");
         case.fragments[1].visible = false;
         assert!(scene(&case, &assets).volumes.is_empty(), "all hidden");
+    }
+
+    #[test]
+    fn an_implant_is_cut_in_its_place_and_only_once() {
+        let (mut case, assets) = planned();
+        // The model's triangle, 10 mm a side in the world, at z = 7; the cutter stands at x = 4.
+        let cutter = Cutter::plane(Point::new(4.0, 0.0, 0.0), Vector::x()).expect("plane");
+        case.cutters.push(crate::case::NamedCutter::new("c", cutter));
+        let whole = scene(&case, &assets).meshes.remove(0).mesh;
+        case.implants[0].keep.insert("c".to_owned(), render::volume::Side::Minus);
+        let item = scene(&case, &assets).meshes.remove(0);
+        let reach =
+            item.mesh.positions().iter().map(|p| item.pose.point(p).x).fold(f64::NEG_INFINITY, f64::max);
+        assert!((reach - 4.0).abs() < 1e-12, "it ends at the cutter: {reach}");
+        let again = scene(&case, &assets).meshes.remove(0).mesh;
+        assert!(Arc::ptr_eq(&item.mesh, &again), "nothing changed, nothing is cut again");
+        case.implants[0].pose = Affine::translation(Vector::new(-5.0, 0.0, 0.0));
+        let moved = scene(&case, &assets).meshes.remove(0).mesh;
+        assert_ne!(moved, again, "moved past the cutter, less is cut off");
+        case.implants[0].pose = Affine::translation(Vector::new(5.0, 0.0, 0.0));
+        assert!(scene(&case, &assets).meshes.is_empty(), "all of it is cut off");
+        case.implants[0].keep.clear();
+        assert!(
+            Arc::ptr_eq(&scene(&case, &assets).meshes[0].mesh, &whole),
+            "whole, and the loaded mesh itself"
+        );
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use render::volume::{Grid, TriangleMesh};
 use thiserror::Error;
 
+use super::cuts::Cuts;
 use super::label_grid::{LabelGrid, LabelGrids};
 use super::{Case, Implant, LabelSet, Source, Volume};
 use crate::load::{self, Content, Item, Limits, LoadError, Note, Progress};
@@ -130,6 +131,7 @@ pub enum AssetError {
 pub struct Assets {
     loaded: BTreeMap<Key, Arc<Asset>>,
     label_grids: LabelGrids,
+    cuts: Cuts,
 }
 
 impl Assets {
@@ -170,6 +172,11 @@ impl Assets {
             },
         };
         Some(self.label_grids.grid(set, &base))
+    }
+
+    /// What cutters leave of the surfaces.
+    pub fn cuts(&self) -> &Cuts {
+        &self.cuts
     }
 
     /// Everything known about some data, where loaded.

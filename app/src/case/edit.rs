@@ -108,12 +108,12 @@ pub enum Edit {
     },
     /// A new cutter at the end of the list.
     AddCutter(NamedCutter),
-    /// Takes a cutter away. Refused while fragments keep a side of it.
+    /// Takes a cutter away. Refused while fragments or implants keep a side of it.
     RemoveCutter {
         /// The cutter.
         id: String,
     },
-    /// Another id; the fragments that name it follow.
+    /// Another id; the fragments and implants that name it follow.
     RenameCutter {
         /// The cutter.
         id: String,
@@ -219,6 +219,13 @@ pub enum Edit {
         /// > 0.
         scale: f64,
     },
+    /// What cutters leave of it.
+    SetImplantKeep {
+        /// The implant.
+        id: String,
+        /// Side kept, by cutter id.
+        keep: BTreeMap<String, Side>,
+    },
     /// Its colour.
     SetImplantColor {
         /// The implant.
@@ -276,13 +283,15 @@ pub enum EditError {
         kind: &'static str,
     },
     /// Something still refers to it.
-    #[error("the {kind} \"{id}\" is still used by fragment \"{by}\"; remove or fuse the fragments first")]
+    #[error("the {kind} \"{id}\" is still used by {user} \"{by}\"; remove that, or its cuts, first")]
     InUse {
         /// Volume or cutter.
         kind: &'static str,
         /// What was to be removed.
         id: String,
-        /// The first fragment that uses it.
+        /// Fragment or implant.
+        user: &'static str,
+        /// The first that uses it.
         by: String,
     },
     /// The last fragment of a volume.
@@ -363,7 +372,7 @@ pub fn apply(case: &mut Case, edit: Edit) -> Result<(), EditError> {
             volume_mut(case, &id)?;
             let user = case.fragments_of(&id).next().map(|f| f.id.clone());
             if let Some(by) = user {
-                return Err(EditError::InUse { kind: "volume", id, by });
+                return Err(EditError::InUse { kind: "volume", id, user: "fragment", by });
             }
             case.volumes.retain(|v| v.id != id);
             case.labels.retain(|l| l.volume != id);
@@ -399,17 +408,21 @@ pub fn apply(case: &mut Case, edit: Edit) -> Result<(), EditError> {
         }
         Edit::RemoveCutter { id } => {
             cutter_mut(case, &id)?;
-            if let Some(user) = case.fragments.iter().find(|f| f.keep.contains_key(&id)) {
-                return Err(EditError::InUse { kind: "cutter", by: user.id.clone(), id });
+            let fragments = case.fragments.iter().map(|f| ("fragment", &f.id, &f.keep));
+            let implants = case.implants.iter().map(|i| ("implant", &i.id, &i.keep));
+            let used = fragments.chain(implants).find(|(_, _, keep)| keep.contains_key(&id));
+            if let Some((user, by, _)) = used {
+                return Err(EditError::InUse { kind: "cutter", user, by: by.clone(), id });
             }
             case.cutters.retain(|c| c.id != id);
         }
         Edit::RenameCutter { id, to } => {
             new_id("cutter", &to, id != to && case.cutter(&to).is_some())?;
             cutter_mut(case, &id)?.id.clone_from(&to);
-            for fragment in &mut case.fragments {
-                if let Some(side) = fragment.keep.remove(&id) {
-                    fragment.keep.insert(to.clone(), side);
+            let fragments = case.fragments.iter_mut().map(|f| &mut f.keep);
+            for keep in fragments.chain(case.implants.iter_mut().map(|i| &mut i.keep)) {
+                if let Some(side) = keep.remove(&id) {
+                    keep.insert(to.clone(), side);
                 }
             }
         }
@@ -485,6 +498,9 @@ fn apply_to_implants(case: &mut Case, edit: Edit) -> Result<(), EditError> {
             new_id("implant", &implant.id, case.implant(&implant.id).is_some())?;
             rigid(&implant.id, implant.pose)?;
             positive(implant.scale)?;
+            for cutter in implant.keep.keys() {
+                cutter_mut(case, cutter)?;
+            }
             unit_color(implant.color, "a component of an implant's colour")?;
             unit(implant.opacity, "an implant's opacity")?;
             case.implants.push(*implant);
@@ -499,6 +515,12 @@ fn apply_to_implants(case: &mut Case, edit: Edit) -> Result<(), EditError> {
         }
         Edit::SetImplantPose { id, pose } => implant_mut(case, &id)?.pose = rigid(&id, pose)?,
         Edit::SetImplantScale { id, scale } => implant_mut(case, &id)?.scale = positive(scale)?,
+        Edit::SetImplantKeep { id, keep } => {
+            for cutter in keep.keys() {
+                cutter_mut(case, cutter)?;
+            }
+            implant_mut(case, &id)?.keep = keep;
+        }
         Edit::SetImplantColor { id, color } => {
             implant_mut(case, &id)?.color = unit_color(color, "a component of an implant's colour")?;
         }

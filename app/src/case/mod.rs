@@ -17,6 +17,7 @@ use render::volume::{Affine, Cutter, Side, Transfer};
 use serde_json::{Map, Value};
 
 pub mod assets;
+pub mod cuts;
 pub mod edit;
 pub mod file;
 pub mod history;
@@ -190,6 +191,8 @@ pub struct Implant {
     pub pose: Affine,
     /// Millimetres per unit of the model, > 0: 1000 for a model in metres.
     pub scale: f64,
+    /// Side kept, by cutter id, of the surface in its place; none keeps all.
+    pub keep: BTreeMap<String, Side>,
     /// Display red, green, blue; 0 to 1.
     pub color: [f64; 3],
     /// 0 to 1; 1 is an opaque surface.
@@ -214,6 +217,7 @@ impl Implant {
             item: 0,
             pose: Affine::identity(),
             scale: 1.0,
+            keep: BTreeMap::new(),
             color: Self::COLOR,
             opacity: 1.0,
             visible: true,
@@ -287,8 +291,12 @@ impl Case {
     /// A fragment as the renderer takes it. A cutter that is not there keeps everything: [`Edit`] and
     /// [`mod@file`] let none such in.
     pub fn piece(&self, fragment: &Fragment) -> Piece {
-        let keep = fragment.keep.iter().filter_map(|(id, side)| Some((self.cutter(id)?.cutter, *side)));
-        Piece { keep: keep.collect(), pose: fragment.pose }
+        Piece { keep: self.sides(&fragment.keep), pose: fragment.pose }
+    }
+
+    /// Cutters with the side kept, as [`Case::piece`] finds them.
+    pub fn sides(&self, keep: &BTreeMap<String, Side>) -> Vec<(Cutter, Side)> {
+        keep.iter().filter_map(|(id, side)| Some((self.cutter(id)?.cutter, *side))).collect()
     }
 
     /// An id that starts with `wish` and is not among `taken`: `ct`, `ct-2`, `ct-3`, ...

@@ -132,15 +132,23 @@ fn check_references(case: &Case) -> Read<()> {
             return fault(format!("labels[{i}].volume"), text, "name one of the volumes");
         }
     }
+    let known =
+        |at: String, keep: &BTreeMap<String, Side>| match keep.keys().find(|id| case.cutter(id).is_none()) {
+            Some(id) => {
+                let text = format!("names cutter \"{id}\", which is not among the cutters");
+                fault(format!("{at}.keep.{id}"), text, "add the cutter or remove the key")
+            }
+            None => Ok(()),
+        };
     for (i, fragment) in case.fragments.iter().enumerate() {
         if case.volume(&fragment.volume).is_none() {
             let text = format!("names volume \"{}\", which is not among the volumes", fragment.volume);
             return fault(format!("fragments[{i}].volume"), text, "name one of the volumes");
         }
-        if let Some(id) = fragment.keep.keys().find(|id| case.cutter(id).is_none()) {
-            let text = format!("names cutter \"{id}\", which is not among the cutters");
-            return fault(format!("fragments[{i}].keep.{id}"), text, "add the cutter or remove the key");
-        }
+        known(format!("fragments[{i}]"), &fragment.keep)?;
+    }
+    for (i, implant) in case.implants.iter().enumerate() {
+        known(format!("implants[{i}]"), &implant.keep)?;
     }
     Ok(())
 }
@@ -274,6 +282,7 @@ fn implant(value: Value, at: String, folder: &Path) -> Read<Implant> {
         scale if scale > 0.0 => Ok(scale),
         scale => fault(at, format!("is {scale}, not more than 0"), "write the millimetres of one unit"),
     })?;
+    let keep = fields.or("keep", BTreeMap::new(), keep)?;
     let color = fields.or("color", Implant::COLOR, unit_numbers)?;
     let opacity = fields.or("opacity", 1.0, |value, at| match number(value, at.clone())? {
         opacity if (0.0..=1.0).contains(&opacity) => Ok(opacity),
@@ -282,7 +291,7 @@ fn implant(value: Value, at: String, folder: &Path) -> Read<Implant> {
     let visible = fields.or("visible", true, boolean)?;
     let shading = fields.or("shading", Shading::Lit, |v, at| shading(v, at, "headlight"))?;
     let other = fields.map;
-    Ok(Implant { id, source, item, pose, scale, color, opacity, visible, shading, other })
+    Ok(Implant { id, source, item, pose, scale, keep, color, opacity, visible, shading, other })
 }
 
 fn camera(value: Value, at: String) -> Read<(Camera, Other)> {

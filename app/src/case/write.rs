@@ -1,6 +1,7 @@
 //! From a [`Case`] to JSON that people can read: known keys first, unknown ones after, short lists of
 //! numbers on one line.
 
+use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
 use render::scene::{Projection, Shading, VolumeMode};
@@ -147,17 +148,21 @@ fn cutter(c: &NamedCutter) -> Value {
 }
 
 fn fragment(f: &Fragment) -> Value {
-    let mut keep = Map::new();
-    for (id, side) in &f.keep {
-        put(&mut keep, id, json!(if *side == Side::Plus { "+" } else { "-" }));
-    }
     let mut map = Map::new();
     put(&mut map, "id", json!(f.id));
     put(&mut map, "volume", json!(f.volume));
-    put(&mut map, "keep", Value::Object(keep));
+    put(&mut map, "keep", keep(&f.keep));
     put(&mut map, "pose", json!(f.pose.to_row_major()));
     put(&mut map, "visible", json!(f.visible));
     with(map, &f.other)
+}
+
+fn keep(sides: &BTreeMap<String, Side>) -> Value {
+    let mut keep = Map::new();
+    for (id, side) in sides {
+        put(&mut keep, id, json!(if *side == Side::Plus { "+" } else { "-" }));
+    }
+    Value::Object(keep)
 }
 
 fn implant(i: &Implant, folder: &Path) -> Result<Value, NotUnicode> {
@@ -170,6 +175,9 @@ fn implant(i: &Implant, folder: &Path) -> Result<Value, NotUnicode> {
     put(&mut map, "pose", json!(i.pose.to_row_major()));
     if i.scale != 1.0 {
         put(&mut map, "scale", json!(i.scale));
+    }
+    if !i.keep.is_empty() {
+        put(&mut map, "keep", keep(&i.keep));
     }
     put(&mut map, "color", json!(i.color));
     put(&mut map, "opacity", json!(i.opacity));

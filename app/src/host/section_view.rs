@@ -247,19 +247,20 @@ impl SectionView {
     fn outlines_ui(&mut self, painter: &Painter, map: &OnScreen, input: &SectionInput<'_>) {
         let mut kept = Vec::new();
         for implant in input.case.implants.iter().filter(|i| i.visible) {
-            let Some(mesh) = input.assets.mesh(implant) else { continue };
+            let cut = crate::scene::implant_cut(input.case, implant, input.assets);
+            let Some(mesh) = cut.and_then(|cut| cut.mesh) else { continue };
             let pose = crate::scene::world_from_model(implant);
             let known = self
                 .outlines
                 .iter()
-                .position(|o| Arc::ptr_eq(&o.mesh, mesh) && o.pose == pose && o.section == map.section);
+                .position(|o| Arc::ptr_eq(&o.mesh, &mesh) && o.pose == pose && o.section == map.section);
             let outline = match known {
                 Some(at) => self.outlines.swap_remove(at),
                 None => Outline {
-                    mesh: Arc::clone(mesh),
                     pose,
                     section: map.section,
-                    lines: section::mesh_outline(&map.section, mesh, &pose),
+                    lines: section::mesh_outline(&map.section, &mesh, &pose),
+                    mesh,
                 },
             };
             let [r, g, b] = implant.color.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);

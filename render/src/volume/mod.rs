@@ -11,6 +11,7 @@
 mod bricks;
 pub mod cells;
 pub mod convex;
+pub mod cut;
 mod cutter;
 mod grid;
 mod labels;

@@ -226,6 +226,25 @@ fn a_rename_is_followed_everywhere() {
 }
 
 #[test]
+fn an_implant_keeps_sides_of_cutters_that_are_there() {
+    let mut case = planned();
+    let keep = |cutter: &str| Edit::SetImplantKeep {
+        id: "stem".to_owned(),
+        keep: BTreeMap::from([(cutter.to_owned(), Side::Minus)]),
+    };
+    let unknown = apply(&mut case, keep("z"));
+    assert!(matches!(unknown, Err(EditError::Missing { kind: "cutter", .. })), "no such cutter");
+    assert_eq!(case, planned(), "nothing happened");
+    apply(&mut case, keep("x")).expect("cut");
+    let used = apply(&mut case, Edit::RemoveCutter { id: "x".to_owned() });
+    assert!(matches!(used, Err(EditError::InUse { user: "implant", .. })), "in use");
+    apply(&mut case, Edit::RenameCutter { id: "x".to_owned(), to: "neck".to_owned() }).expect("renamed");
+    assert_eq!(case.implants[0].keep.keys().collect::<Vec<_>>(), ["neck"], "the implant follows");
+    apply(&mut case, Edit::SetImplantKeep { id: "stem".to_owned(), keep: BTreeMap::new() }).expect("whole");
+    apply(&mut case, Edit::RemoveCutter { id: "neck".to_owned() }).expect("the cutter is free");
+}
+
+#[test]
 fn numbers_out_of_range_are_refused() {
     let before = planned();
     let stem = || "stem".to_owned();

@@ -1,10 +1,12 @@
 //! The panel of the implants.
 
-use egui::{Button, Slider, Ui};
+use egui::{Button, ComboBox, Slider, Ui};
+use render::volume::Side;
 
 use super::place;
 use crate::case::{Edit, Implant};
 use crate::host::context::{Request, Shading, ToolContext};
+use crate::scene;
 use crate::ui::pose::{PoseEditor, PoseInput};
 use crate::ui::{name, theme, value};
 
@@ -81,6 +83,7 @@ fn chosen_ui(pose: &mut PoseEditor, ctx: &mut ToolContext<'_>, ui: &mut Ui, impl
     };
     scale_ui(ctx, ui, implant, place::longest(mesh));
     theme::quiet_ui(ui, format!("{} triangles", mesh.triangles().len()));
+    keep_ui(ctx, ui, implant);
     let middle = place::middle(mesh, implant.scale);
     if ui.button("Put it at the crosshair").clicked() {
         let pose = place::moved_to(&implant.pose, &middle, &ctx.crosshair());
@@ -89,6 +92,34 @@ fn chosen_ui(pose: &mut PoseEditor, ctx: &mut ToolContext<'_>, ui: &mut Ui, impl
     let input = PoseInput { pose: implant.pose, centre: middle, crosshair: ctx.crosshair(), offered: None };
     if let Some(pose) = pose.ui(ui, &input) {
         ctx.edit(Edit::SetImplantPose { id: id(), pose });
+    }
+}
+
+/// Which side of each cutter stays.
+fn keep_ui(ctx: &mut ToolContext<'_>, ui: &mut Ui, implant: &Implant) {
+    const CHOICES: [(Option<Side>, &str); 3] =
+        [(None, "not cut"), (Some(Side::Plus), "keeps +"), (Some(Side::Minus), "keeps −")];
+    for cutter in &ctx.case.cutters {
+        let now = implant.keep.get(&cutter.id).copied();
+        let mut chosen = now;
+        let words = CHOICES.iter().find(|(side, _)| *side == now).map_or("", |(_, words)| words);
+        ComboBox::from_label(format!("Cut by {}", cutter.id)).selected_text(words).show_ui(ui, |ui| {
+            for (side, words) in CHOICES {
+                ui.selectable_value(&mut chosen, side, words);
+            }
+        });
+        if chosen != now {
+            let mut keep = implant.keep.clone();
+            keep.remove(&cutter.id);
+            keep.extend(chosen.map(|side| (cutter.id.clone(), side)));
+            ctx.edit(Edit::SetImplantKeep { id: implant.id.clone(), keep });
+        }
+    }
+    let Some(cut) = scene::implant_cut(ctx.case, implant, ctx.assets) else { return };
+    match (cut.open, cut.mesh) {
+        (0, Some(_)) => {}
+        (_, None) => theme::quiet_ui(ui, "The cutters leave nothing of it."),
+        (_, Some(_)) => theme::quiet_ui(ui, "The surface is open where it is cut, so the cut is not closed."),
     }
 }
 

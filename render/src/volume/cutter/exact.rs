@@ -6,13 +6,19 @@
 use super::super::{Point, Vector};
 
 /// A number with the sign of n·p − n·q, exactly.
+#[inline]
+pub(in super::super) fn plane_sign(n: &Vector, p: &Point, q: &Point) -> f64 {
+    sign_of_sum([(n.x, p.x), (n.y, p.y), (n.z, p.z), (-n.x, q.x), (-n.y, q.y), (-n.z, q.z)])
+}
+
+/// A number with the sign of the sum of six products, exactly, where none overflows or underflows.
 ///
 /// A plain evaluation decides where its error bound allows; otherwise the six products are added as an
 /// expansion without rounding. Source: Shewchuk 1997, "Adaptive Precision Floating-Point Arithmetic",
 /// sections 2.2 to 2.5 (`TWO-PRODUCT`, `GROW-EXPANSION`); the product's error here comes from a fused
 /// multiply-add.
-pub(super) fn plane_sign(n: &Vector, p: &Point, q: &Point) -> f64 {
-    let products = [(n.x, p.x), (n.y, p.y), (n.z, p.z), (-n.x, q.x), (-n.y, q.y), (-n.z, q.z)];
+#[inline]
+pub(in super::super) fn sign_of_sum(products: [(f64, f64); 6]) -> f64 {
     let (mut sum, mut size) = (0.0_f64, 0.0_f64);
     for (a, b) in products {
         sum += a * b;

@@ -10,6 +10,7 @@ mod body;
 mod exact;
 
 pub use body::{Body, Face};
+pub(super) use exact::{plane_sign, sign_of_sum};
 use thiserror::Error;
 
 use super::{Affine, Point, Vector};
