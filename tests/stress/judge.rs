@@ -1,7 +1,7 @@
 //! Whether a picture is the right one.
 //!
 //! Where a ray touches an edge of a surface, either side of it is right: a pixel passes if it lies among what the
-//! reference shows when the eye is moved by a ten thousandth of a pixel.
+//! reference shows when the eye is moved by a thousandth of a pixel.
 
 use render::image::FloatImage;
 use render::scene::{Projection, Scene};
