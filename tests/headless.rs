@@ -35,7 +35,7 @@ fn assert_error(outcome: &Outcome, code: i32, names: &str) {
 fn help_and_version_are_asked_for_and_succeed() {
     let help = osteotome(&["--help"]);
     assert_eq!(help.code(), 0, "{}", help.stderr);
-    for command in ["info", "render", "compress", "bench", "demo"] {
+    for command in ["info", "render", "section", "compress", "bench", "demo"] {
         assert!(help.stdout.contains(command), "the help tells of {command}: {}", help.stdout);
     }
     let version = osteotome(&["--version"]);
@@ -50,6 +50,8 @@ fn wrong_usage_is_exit_code_2() {
         &["render", "case.json", "--out", "p.png", "--size", "wide"],
         &["render", "case.json", "--out", "p.png", "--size", "0x10"],
         &["render", "case.json", "--out", "p.png", "--backend", "abacus"],
+        &["section", "case.json", "--out", "p.png", "--plane", "front"],
+        &["section", "case.json", "--out", "p.png", "--at", "1,2"],
         &["info"],
         &["info", "--no-such-flag"],
     ] {
@@ -421,4 +423,55 @@ fn a_damaged_series_file_is_named_with_its_fault() {
     let picture = folder.path().join("p.png");
     assert_error(&osteotome(&["render", text(&broken), "--out", text(&picture)]), 3, "flipped.series");
     assert!(!picture.exists(), "a damaged step is no picture");
+}
+
+#[test]
+fn a_section_shows_volumes_labels_and_the_lines_of_moved_fragments() {
+    let folder = tempfile::tempdir().unwrap();
+    // Values rise by 10 a voxel of 2 mm along x; labels of 4 mm along z.
+    cases::write_nrrd(&folder.path().join("ramp.nrrd"), [40, 20, 20], 2.0, |[x, _, _]| x as i16 * 10);
+    cases::write_nrrd(&folder.path().join("labels.nrrd"), [20, 10, 10], 4.0, |[_, _, z]| i16::from(z == 2));
+    let transfer = json!({"points": [[0, 1, 1, 1, 0.1]]});
+    let case = json!({
+        "osteotome": 1, "name": "sections",
+        "volumes": [{"id": "v", "source": "ramp.nrrd", "transfer": transfer}],
+        "cutters": [{"id": "c", "plane": {"point": [39, 0, 0], "normal": [1, 0, 0]}}],
+        "fragments": [{"id": "l", "volume": "v", "keep": {"c": "-"}},
+            {"id": "r", "volume": "v", "keep": {"c": "+"}, "pose": [1,0,0,40, 0,1,0,0, 0,0,1,0, 0,0,0,1]}],
+        "labels": [{"id": "s", "volume": "v", "source": "labels.nrrd", "colors": {"1": [1, 0, 0, 1]}}]
+    });
+    let case = cases::write_case(folder.path(), &case);
+    let section = |args: &[&str]| {
+        let picture = folder.path().join("s.png");
+        let outcome = osteotome(
+            &[
+                &["section", text(&case), "--out", text(&picture), "--size", "120x40", "--mm-per-pixel", "1"],
+                args,
+            ]
+            .concat(),
+        );
+        assert_eq!(outcome.code(), 0, "{args:?}: {}", outcome.stderr);
+        open_rgb(&picture)
+    };
+    // Pixel (i, j) is at x = i - 10 + 0.5 and, seen from the front, z = 39.5 - j.
+    let front = section(&["--plane", "coronal", "--at", "50,19,20"]);
+    let at = |x: u32, z: u32| front.get_pixel(x + 10, 39 - z).0;
+    let grey = at(20, 30)[0];
+    assert!(at(20, 30) == [grey; 3] && at(30, 30)[0] > grey, "it rises to the left: {:?}", at(30, 30));
+    assert_eq!(at(45, 30), [0, 0, 0], "the gap where the right part was");
+    assert!(at(85, 30)[0] > at(30, 30)[0], "and there it is, brighter still: {:?}", at(85, 30));
+    assert_eq!((at(20, 8), at(100, 8)), ([255, 0, 0], [255, 0, 0]), "the label on both parts");
+    let cutter = [236, 112, 208];
+    assert_eq!((at(39, 20), at(79, 20)), (cutter, cutter), "the cutter at each part");
+    // A slab across x: the mean over 20 mm is the middle's value, MIP that 10 mm on.
+    let across = ["--plane", "sagittal", "--at", "20,19,30"];
+    let middle = |more: &[&str]| section(&[&across[..], more].concat()).get_pixel(60, 20).0[0];
+    let thin = middle(&[]);
+    assert!(middle(&["--thickness", "20"]).abs_diff(thin) <= 1, "the mean of what rises evenly");
+    let brighter = middle(&["--thickness", "20", "--mode", "mip"]) - thin;
+    let darker = thin - middle(&["--thickness", "20", "--mode", "minip"]);
+    assert!(brighter > 10 && brighter.abs_diff(darker) <= 1, "as much either way: {brighter}, {darker}");
+    // Obliquely along x = y the ramp is still there, and longer.
+    let oblique = section(&["--plane", "-1,1,0", "--at", "20,19,30"]);
+    assert!(colours(&oblique) > 10, "an oblique section");
 }

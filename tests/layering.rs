@@ -62,6 +62,15 @@ fn rules() -> Vec<Rule> {
             ]),
         ),
         rule(
+            &["render/src/cpu/"],
+            &[],
+            all(&[
+                &UI,
+                &GPU,
+                &["compress", "crate::reference", "crate::gpu", "crate::passes", "crate::texture"],
+            ]),
+        ),
+        rule(
             &["app/src/load/"],
             &[],
             all(&[

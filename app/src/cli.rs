@@ -36,6 +36,8 @@ pub enum Command {
     Info(InfoArgs),
     /// Draw one picture of a case, or of a data file or folder.
     Render(RenderArgs),
+    /// Draw a cross-section of a case, or of a data file or folder: thin or thick, along the body or oblique.
+    Section(SectionArgs),
     /// Make a texture file (KTX2) of a volume.
     Compress(CompressArgs),
     /// Measure run time beside error; one JSON object a line with --json.
@@ -67,10 +69,10 @@ pub struct RenderArgs {
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", default_value = "768x768", value_parser = size)]
     pub size: [u32; 2],
-    /// What draws it: the GPU, or the exact reference on the CPU.
-    #[arg(long, value_enum, default_value_t = Backend::Gpu)]
+    /// What draws it: the GPU, the processor, or the exact reference.
+    #[arg(long, value_enum, default_value_t = Backend::Auto)]
     pub backend: Backend,
-    /// How fine the GPU samples a ray.
+    /// How fine a ray is sampled.
     #[arg(long, value_enum, default_value_t = QualityName::Good)]
     pub quality: QualityName,
     /// Print one JSON object of figures.
@@ -78,16 +80,74 @@ pub struct RenderArgs {
     pub stats: bool,
 }
 
+/// Arguments of `section`.
+#[derive(Debug, Args)]
+pub struct SectionArgs {
+    /// A case file, or a data file or folder.
+    #[arg(value_name = "CASE")]
+    pub input: PathBuf,
+    /// The picture: .png.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// axial, coronal, sagittal, or the direction of view as x,y,z (LPS).
+    #[arg(long, value_name = "PLANE", default_value = "axial", value_parser = plane, allow_hyphen_values = true)]
+    pub plane: PlaneName,
+    /// The place in the middle of the picture, x,y,z in mm (LPS); the middle of what is shown if not given.
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    pub at: Option<[f64; 3]>,
+    /// Thickness of the slab; mm.
+    #[arg(long, value_name = "MM", default_value_t = 0.0)]
+    pub thickness: f64,
+    /// What is shown of the values over the thickness.
+    #[arg(long, value_enum, default_value_t = SlabName::Mean)]
+    pub mode: SlabName,
+    /// Width and height in pixels.
+    #[arg(long, value_name = "WxH", default_value = "768x768", value_parser = size)]
+    pub size: [u32; 2],
+    /// Length of a pixel's side; everything fits if not given.
+    #[arg(long, value_name = "MM")]
+    pub mm_per_pixel: Option<f64>,
+}
+
+/// The direction of a cross-section.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PlaneName {
+    /// Across the body, seen from the feet.
+    Axial,
+    /// From the front.
+    Coronal,
+    /// From the patient's left.
+    Sagittal,
+    /// Along a direction of view; LPS.
+    Along([f64; 3]),
+}
+
+/// What a slab shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SlabName {
+    /// The mean.
+    Mean,
+    /// The greatest value.
+    Mip,
+    /// The least value.
+    #[value(name = "minip")]
+    MinIp,
+}
+
 /// What draws a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Backend {
+    /// The GPU; where the machine has none, the processor, unless the case asks for a texture that loses something.
+    Auto,
     /// The wgpu renderer.
     Gpu,
+    /// The processor alone, from the samples as they are.
+    Cpu,
     /// The reference: exact, on all CPU cores.
     Reference,
 }
 
-/// How fine the GPU samples a ray.
+/// How fine a ray is sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum QualityName {
     /// While the hand moves.
@@ -250,6 +310,8 @@ pub enum BenchName {
     Accuracy,
     /// Frame time against error over spacings, textures and renderers, with a peer's beside ours.
     Pareto,
+    /// What skipping saves, on data: nothing skipped, a changed transfer function, a moved cut, seven ways to cut.
+    Skips,
 }
 
 /// Arguments of `demo`.
@@ -287,6 +349,32 @@ fn goal(text: &str) -> Result<Goal, String> {
     }
 }
 
+/// `axial`, or `0,0.5,1`.
+fn plane(text: &str) -> Result<PlaneName, String> {
+    Ok(match text {
+        "axial" => PlaneName::Axial,
+        "coronal" => PlaneName::Coronal,
+        "sagittal" => PlaneName::Sagittal,
+        _ => {
+            let direction = triple(text).map_err(|_not_numbers| {
+                format!("\"{text}\" is no plane: write axial, coronal, sagittal or a direction as in 0,0.5,1")
+            })?;
+            if direction == [0.0; 3] {
+                return Err("0,0,0 is no direction: write one that has a length, as in 0,0.5,1".to_owned());
+            }
+            PlaneName::Along(direction)
+        }
+    })
+}
+
+/// `1.5,-20,300`.
+fn triple(text: &str) -> Result<[f64; 3], String> {
+    let wrong = || format!("\"{text}\" is no place: write X,Y,Z in mm, as in 1.5,-20,300");
+    let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(wrong);
+    let numbers: Vec<f64> = text.split(',').map(number).collect::<Result<_, _>>()?;
+    numbers.try_into().map_err(|_count| wrong())
+}
+
 /// `640x480`.
 fn size(text: &str) -> Result<[u32; 2], String> {
     let wrong =
@@ -311,6 +399,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         None => return window(cli.paths),
         Some(Command::Info(args)) => headless::info::run(args),
         Some(Command::Render(args)) => headless::render::run(args),
+        Some(Command::Section(args)) => headless::section::run(args),
         Some(Command::Compress(args)) => headless::compress::run(args),
         Some(Command::Bench(args)) => headless::bench::run(args),
         Some(Command::Demo(args)) => headless::demo::run(args),
@@ -380,6 +469,17 @@ mod tests {
         for wrong in ["4", "3,2", "4,5", "a,b", ""] {
             assert!(layout(wrong).is_err(), "{wrong} was accepted");
         }
+    }
+
+    #[test]
+    fn a_plane_is_named_or_a_direction() {
+        assert_eq!(plane("coronal"), Ok(PlaneName::Coronal), "by name");
+        assert_eq!(plane("0,-0.5, 1"), Ok(PlaneName::Along([0.0, -0.5, 1.0])), "by its direction");
+        for wrong in ["front", "1,2", "1,2,3,4", "0,0,0", "1,nan,0", ""] {
+            assert!(plane(wrong).is_err(), "{wrong} was accepted");
+        }
+        let args = ["osteotome", "section", "a.json", "--out", "a.png", "--at", "-1,2,3"];
+        assert!(Cli::try_parse_from(args).is_ok(), "a place may begin with a minus");
     }
 
     #[test]

@@ -5,9 +5,10 @@
 
 use std::sync::Arc;
 
-use render::scene::{Camera, MeshItem, Piece, Projection, Scene, VolumeItem};
+use render::scene::{Camera, Labels, MeshItem, Piece, Projection, Scene, VolumeItem};
 use render::volume::{Affine, Point, Vector};
 
+use crate::case::labels::{LabelSet, MAX_LABEL};
 use crate::case::{Assets, Case, Implant, Volume};
 
 /// Vertical field of view of a camera that the case does not give; degrees.
@@ -47,7 +48,23 @@ fn volume(case: &Case, volume: &Volume, assets: &Assets) -> Option<VolumeItem> {
         shading: volume.shading,
         texture: volume.texture,
         pieces,
+        labels: labels(case, volume, assets),
+        mode: volume.mode,
     })
+}
+
+/// What is painted on a volume: its first visible label set, where loaded.
+pub fn labels(case: &Case, volume: &Volume, assets: &Assets) -> Option<Labels> {
+    let set = case.labels_of(&volume.id)?;
+    let found = assets.labels(case, set)?;
+    let most = found.counts.keys().next_back().copied()?.min(MAX_LABEL);
+    // A set without a source lies on the volume's own grid, one with a source where its file says: both in the
+    // patient's space, that the volume's pose places.
+    Some(Labels { grid: found.grid, pose: volume.pose, colors: colors(set, most) })
+}
+
+fn colors(set: &LabelSet, most: u32) -> Arc<[[f64; 4]]> {
+    std::iter::once([0.0; 4]).chain((1..=most).map(|label| set.color(label))).collect()
 }
 
 fn implant(implant: &Implant, assets: &Assets) -> Option<MeshItem> {

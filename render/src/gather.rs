@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::gpu::{Gpu, GpuError};
+use crate::gpu::{Caps, Gpu, GpuError};
 use crate::passes::slabs::{Kind, MAX_GAPS, Member, Proxy, Spacing, gpu_data};
-use crate::scene::{Scene, Shading, VolumeItem};
+use crate::scene::{Scene, Shading, VolumeItem, VolumeMode};
 use crate::texture::{Plan, Reading, TextureCache, VolumeTexture};
 use crate::transfer::{NODES, ROWS, Table};
 use crate::view::{Form, View};
@@ -85,10 +85,14 @@ impl Gathered {
         view: &View,
         textures: &mut TextureCache,
         bricks: &mut BrickCache,
+        texture_bytes: u64,
     ) -> Result<Self, GpuError> {
         let mut all = Self::default();
+        // Each volume has an equal share of what all may take.
+        let texture_budget = texture_bytes / (scene.volumes.len() as u64).max(1);
+        let caps = Caps { texture_budget, ..gpu.caps() };
         for item in &scene.volumes {
-            all.add_volume(gpu, item, view, textures, bricks)?;
+            all.add_volume(gpu, caps, item, view, textures, bricks)?;
         }
         textures.forget_unused();
         all.textures_sent = textures.take_sent();
@@ -111,6 +115,7 @@ impl Gathered {
     fn add_volume(
         &mut self,
         gpu: &Gpu,
+        caps: Caps,
         item: &VolumeItem,
         view: &View,
         textures: &mut TextureCache,
@@ -118,6 +123,12 @@ impl Gathered {
     ) -> Result<(), GpuError> {
         if item.pieces.is_empty() {
             return Ok(());
+        }
+        if item.mode != VolumeMode::Composite {
+            return Err(GpuError::CpuOnly { what: "a volume as MIP or isosurface" });
+        }
+        if item.labels.is_some() {
+            return Err(GpuError::CpuOnly { what: "a volume with labels" });
         }
         let (bounds, grid_place, range) = if let Some(step) = &item.packed {
             (Some(step.bounds()), *step.world_from_voxel(), step.range())
@@ -161,9 +172,7 @@ impl Gathered {
             if outside > MAX_GAPS {
                 return Err(GpuError::Cylinders { count: outside, limit: MAX_GAPS });
             }
-            let (Some(bounds), Some(proxy)) =
-                (solid.bounds(), Proxy::new(&solid.transformed(&view_from_voxel)))
-            else {
+            let Some(proxy) = Proxy::new(&solid.transformed(&view_from_voxel)) else {
                 self.counts.fragments_empty += 1;
                 continue;
             };
@@ -172,7 +181,8 @@ impl Gathered {
                 textures.step(gpu, step)?
             } else {
                 let notes = &mut self.notes;
-                let plan = Plan::new(&item.grid, &item.transfer, item.texture, bounds, gpu.caps(), notes);
+                // One texture for all fragments, of all that the volume shows: cutting it makes none anew.
+                let plan = Plan::new(&item.grid, &item.transfer, item.texture, [low, high], caps, notes);
                 textures.get(gpu, &plan)?
             };
             let kind = match (texture.reading, item.shading) {

@@ -27,10 +27,12 @@
 //! - *Shewchuk 1997*: "Adaptive precision floating-point arithmetic and fast robust geometric predicates",
 //!   Discrete & Computational Geometry 18.
 
+pub mod cpu;
 mod gather;
 pub mod gpu;
 pub mod image;
 mod passes;
+pub mod recovery;
 pub mod reference;
 pub mod renderer;
 pub mod scene;

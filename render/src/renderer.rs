@@ -23,7 +23,7 @@ pub enum Quality {
     Draft,
     /// One voxel.
     Good,
-    /// A quarter of a voxel.
+    /// An eighth of a voxel.
     Finest,
     /// This many voxels, for measurements; > 0.
     Spacing(f64),
@@ -35,7 +35,7 @@ impl Quality {
         match self {
             Self::Draft => 2.0,
             Self::Good => 1.0,
-            Self::Finest => 0.25,
+            Self::Finest => 0.125,
             Self::Spacing(voxels) => voxels.max(1e-3),
         }
     }
@@ -43,6 +43,10 @@ impl Quality {
 
 /// Sub-steps in a slab, unless a stack would have too many slabs.
 const STEPS: u32 = 8;
+/// What all textures may take at first. No interface tells how much memory there is: a small graphics card has it.
+const TEXTURE_BYTES: u64 = 1 << 30;
+/// Below this, memory is not what is short.
+const LEAST_TEXTURE_BYTES: u64 = 1 << 22;
 /// Layers a pixel that room is made for at first.
 const LAYERS_AT_FIRST: u32 = 4;
 
@@ -77,8 +81,20 @@ pub struct Stats {
     pub off_screen_skipped: u32,
     /// Looks for finished pixels.
     pub saturate_looks: u32,
-    /// Crossings of translucent surfaces.
+    /// Crossings of surfaces: of translucent ones by the GPU, of all by the CPU.
     pub layers: u64,
+    /// By the CPU: tiles of the picture, once for each fragment.
+    pub tiles: u64,
+    /// By the CPU: tiles in which a fragment shows nothing.
+    pub tiles_skipped: u64,
+    /// By the CPU: cells of volumes that rays went through.
+    pub cells: u64,
+    /// By the CPU: pixels that were done before their ray's end.
+    pub pixels_finished: u64,
+    /// By the CPU: volumes made ready for this picture; the others were.
+    pub volumes_prepared: u32,
+    /// By the CPU: transfer functions made ready for this picture; the others were.
+    pub transfers_prepared: u32,
     /// Bands that the picture was drawn in.
     pub bands: u32,
     /// Textures made and sent for this frame; the others were there.
@@ -102,6 +118,8 @@ pub struct Renderer {
     /// The step last sent ahead of its picture.
     sent: Option<Arc<VolumeTexture>>,
     target: Option<Target>,
+    /// What all textures of a picture may take where their format is left to the renderer; bytes.
+    texture_bytes: u64,
 }
 
 impl Renderer {
@@ -127,6 +145,7 @@ impl Renderer {
             bricks: BrickCache::default(),
             sent: None,
             target: None,
+            texture_bytes: TEXTURE_BYTES,
         })
     }
 
@@ -138,6 +157,14 @@ impl Renderer {
     /// What decodes the steps of time series from now on; [`StepDecoder::Auto`] at first.
     pub fn set_step_decoder(&mut self, decoder: StepDecoder) {
         self.textures.set_decoder(decoder);
+    }
+
+    /// What all textures of a picture may take from now on where their format is left to the renderer; bytes. Each
+    /// volume has an equal share: where 16 bits a voxel do not fit there, blocks are taken, and then fewer voxels,
+    /// with a note.
+    pub fn set_texture_bytes(&mut self, bytes: u64) {
+        self.texture_bytes = bytes;
+        self.textures.clear();
     }
 
     /// Takes `new` for `old` from now on, which differs from it only in the voxels from `touched[0]` to before
@@ -166,7 +193,7 @@ impl Renderer {
         self.textures.forget_unused();
         self.sent = Some(self.textures.step(&gpu, step)?);
         // Work begins without waiting for a picture.
-        gpu.queue.submit([]);
+        gpu.submit(None);
         Ok(())
     }
 
@@ -183,16 +210,41 @@ impl Renderer {
         self.target.as_ref().map(|t| &t.display_view)
     }
 
-    /// Draws a scene into a picture of `size` pixels and waits for it.
+    /// Draws a scene into a picture of `size` pixels and waits for it. Where memory runs out, it tries again with half
+    /// of what textures may take, and says so in a note.
     ///
     /// # Errors
     /// [`GpuError`]: a camera that shows nothing, a size the device does not allow, memory, a lost device.
     pub fn render(&mut self, scene: &Scene, size: [u32; 2], quality: Quality) -> Result<Stats, GpuError> {
+        let mut reduced = false;
+        loop {
+            match self.render_once(scene, size, quality) {
+                Err(GpuError::OutOfMemory { .. }) if self.texture_bytes > LEAST_TEXTURE_BYTES => {
+                    self.target = None;
+                    self.set_texture_bytes(self.texture_bytes / 2);
+                    reduced = true;
+                }
+                Ok(mut stats) => {
+                    if reduced {
+                        let mib = self.texture_bytes >> 20;
+                        stats
+                            .notes
+                            .push(format!("the GPU ran out of memory: textures now take {mib} MiB at most"));
+                    }
+                    return Ok(stats);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    fn render_once(&mut self, scene: &Scene, size: [u32; 2], quality: Quality) -> Result<Stats, GpuError> {
         let start = Instant::now();
         let gpu = Arc::clone(&self.gpu);
         self.resize(size)?;
         let view = View::new(&scene.camera, size)?;
-        let gathered = Gathered::new(&gpu, scene, &view, &mut self.textures, &mut self.bricks)?;
+        let gathered =
+            Gathered::new(&gpu, scene, &view, &mut self.textures, &mut self.bricks, self.texture_bytes)?;
         let mut stats = self.stats(&gathered);
         let step_mm = gathered.finest_mm.map(|voxel| voxel * quality.voxels());
         let depth = |side: usize, start: f64, pick: fn(f64, f64) -> f64| {
@@ -212,14 +264,9 @@ impl Renderer {
         if let Some(mut spacing) = spacing {
             let mut stack = Stack::new(&gathered.members, &view, &spacing);
             if stack.most_overlapping > SLOTS {
-                // Draws of one slab follow each other there, so a slab is one sub-step: its order is then
-                // wrong by less than that.
+                // A slab's optical depths are added up there by several draws, which take it as one sub-step.
                 spacing = spacing.single_steps();
                 stack = Stack::new(&gathered.members, &view, &spacing);
-                stats.notes.push(format!(
-                    "{} fragments overlap in the picture; beyond {SLOTS} they are mixed slice by slice",
-                    stack.most_overlapping
-                ));
             }
             let frame = frame_data(scene, &view, &spacing);
             whole = bind_frame(&gpu, &self.frame_layout, &frame);
@@ -234,7 +281,7 @@ impl Renderer {
             };
             let meshes = self.surfaces.prepare(&gpu, &scene.meshes, &view, spacing.near_mm);
             self.surfaces.draw_opaque(&mut encoder, &meshes, target, &whole);
-            gpu.queue.submit([encoder.finish()]);
+            gpu.submit(Some(encoder));
             stats.prepare_ms = start.elapsed().as_secs_f64() * 1e3;
             stats.step_mm = spacing.step_mm;
             stats.steps_per_slab = spacing.steps;
@@ -282,14 +329,14 @@ impl Renderer {
                 let mut encoder =
                     gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
                 stats.saturate_looks += self.slabs.draw(&gpu, &mut encoder, &ready, target, &bound, rows);
-                gpu.queue.submit([encoder.finish()]);
+                gpu.submit(Some(encoder));
                 stats.draws += stack.draws.len() as u32;
                 stats.bands += 1;
             }
             encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         }
         self.present.draw(&gpu, &mut encoder, &whole, &target.picture_view, &target.display_view);
-        gpu.queue.submit([encoder.finish()]);
+        gpu.submit(Some(encoder));
         gpu.wait()?;
         stats.frame_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(stats)

@@ -92,6 +92,45 @@ impl Piece {
     }
 }
 
+/// How a volume becomes a picture; what each means is said in [`mod@crate::reference`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum VolumeMode {
+    /// Emission and absorption along the ray.
+    #[default]
+    Composite,
+    /// The greatest value on the ray, classified once.
+    Mip,
+    /// The surface where the scalar has a value, lit from the eye, in the transfer function's colour there.
+    Isosurface {
+        /// Of the scalar.
+        value: f64,
+        /// Of each crossing; 0 to 1, 1 is opaque.
+        opacity: f64,
+    },
+}
+
+/// Regions painted on a volume: whole numbers on a grid of their own, that ride with its pieces.
+///
+/// Where the nearest label (see [`crate::volume::label_at`]) is n > 0 with colour (r, g, b, a), the colour c
+/// that the transfer function gives there becomes (1 - a)·c + a·(r, g, b), before light; extinction stays.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Labels {
+    /// One label a sample; 0 is none.
+    pub grid: Arc<Grid>,
+    /// `world_from_patient` of the labels, about the volume in its unmoved place; most often the volume's own.
+    pub pose: Affine,
+    /// Red, green, blue and share of label n at `colors[n]`; 0 to 1. The first is not used; a label past the
+    /// end is not painted.
+    pub colors: Arc<[[f64; 4]]>,
+}
+
+impl Labels {
+    /// The colour of a label that is painted.
+    pub fn color(&self, label: u32) -> Option<[f64; 4]> {
+        self.colors.get(label as usize).copied().filter(|c| label > 0 && c[3] > 0.0)
+    }
+}
+
 /// A volume to draw.
 #[derive(Debug, Clone)]
 pub struct VolumeItem {
@@ -110,6 +149,10 @@ pub struct VolumeItem {
     pub texture: TextureFormat,
     /// The pieces to draw; none draws nothing.
     pub pieces: Vec<Piece>,
+    /// What is painted on it.
+    pub labels: Option<Labels>,
+    /// What is drawn of it.
+    pub mode: VolumeMode,
 }
 
 /// A surface to draw; every crossing of a ray with it composites, front and back faces alike.

@@ -23,6 +23,7 @@ pub(crate) struct Target {
 impl Target {
     pub(crate) fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
         use wgpu::TextureUsages as U;
+        gpu.count_call();
         let texture = |label, format, usage| {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),

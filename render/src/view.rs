@@ -4,8 +4,7 @@
 //! `f64`; what a shader gets is relative to the near plane of the slab stack, so that neither a far eye
 //! nor a far scene costs digits.
 
-use crate::gpu::GpuError;
-use crate::scene::{Camera, Projection};
+use crate::scene::{Camera, CameraError, Projection};
 use crate::volume::{Affine, Point, Vector, convex::HalfSpace};
 
 /// GPU mirrors of `shader/shared/frame.wgsl`.
@@ -53,10 +52,10 @@ pub(crate) struct View {
 }
 
 impl View {
-    pub(crate) fn new(camera: &Camera, size: [u32; 2]) -> Result<Self, GpuError> {
+    pub(crate) fn new(camera: &Camera, size: [u32; 2]) -> Result<Self, CameraError> {
         let frame = camera.frame()?;
         let world_from_view = Affine::from_columns(frame.right, frame.up, frame.forward, camera.eye)
-            .map_err(|_singular| crate::scene::CameraError::NotFinite)?;
+            .map_err(|_singular| CameraError::NotFinite)?;
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let (half, perspective) = match camera.projection {
             Projection::Perspective { fov_rad } => ((fov_rad / 2.0).tan(), true),

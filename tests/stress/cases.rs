@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use render::scene::{Camera, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem};
+use render::scene::{Camera, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem, VolumeMode};
 use render::volume::{Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Transfer, Vector};
 
 use super::parts::{self, Corners};
@@ -78,6 +78,8 @@ fn volume(random: &mut Random, grid: Grid, size: f64, cut: bool) -> VolumeItem {
         shading: Shading::None,
         texture: TextureFormat::R32f,
         pieces,
+        labels: None,
+        mode: VolumeMode::Composite,
     }
 }
 

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use render::image::FloatImage;
-use render::scene::{Camera, MeshItem, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem};
+use render::scene::{
+    Camera, MeshItem, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem, VolumeMode,
+};
 use render::volume::{
     Affine, ControlPoint, Grid, Point, Rescale, Samples, Transfer, TriangleMesh, Vector, synth,
 };
@@ -27,6 +29,8 @@ fn cube(voxels: usize, value: f64, points: Vec<ControlPoint>, unit_mm: f64) -> S
         shading: Shading::None,
         texture: TextureFormat::R32f,
         pieces: vec![Piece::whole()],
+        labels: None,
+        mode: VolumeMode::Composite,
     };
     let camera = Camera {
         eye: Point::new(0.0, -40.0, 0.0),

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
+use render::cpu::CpuRenderer;
 use render::gpu::Gpu;
 use render::image::FloatImage;
 use render::reference;
@@ -18,7 +19,7 @@ pub(super) struct Drawer {
 
 /// All that are measured against the reference.
 pub(super) fn all() -> Vec<Drawer> {
-    let mut drawers = Vec::new();
+    let mut drawers = vec![Drawer { name: "cpu", draw: by_cpu }];
     if gpu_wanted() {
         drawers.push(Drawer { name: "gpu", draw: by_gpu });
     }
@@ -34,6 +35,11 @@ static GPU: LazyLock<Result<Mutex<Renderer>, String>> = LazyLock::new(|| {
     let gpu = Gpu::headless().map_err(|e| e.to_string())?;
     Ok(Mutex::new(Renderer::new(Arc::new(gpu)).map_err(|e| e.to_string())?))
 });
+
+fn by_cpu(scene: &Scene, size: [u32; 2], voxels: f64) -> Result<FloatImage, String> {
+    let drawn = CpuRenderer::new().render(scene, size, Quality::Spacing(voxels), &|_, _| true);
+    drawn.map(|(picture, _)| picture).map_err(|e| e.to_string())
+}
 
 fn by_gpu(scene: &Scene, size: [u32; 2], voxels: f64) -> Result<FloatImage, String> {
     let mut renderer = GPU.as_ref().map_err(Clone::clone)?.lock().unwrap_or_else(PoisonError::into_inner);

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use render::volume::{Grid, TriangleMesh};
 use thiserror::Error;
 
-use super::{Case, Implant, Source, Volume};
+use super::label_grid::{LabelGrid, LabelGrids};
+use super::{Case, Implant, LabelSet, Source, Volume};
 use crate::load::{self, Content, Item, Limits, LoadError, Note, Progress};
 use crate::sample;
 use crate::steps::{self, SeriesFileError, Steps};
@@ -36,6 +37,11 @@ impl Key {
     /// What a volume needs.
     pub fn of_volume(volume: &Volume) -> Self {
         Self { source: volume.source.clone(), kind: Kind::Volume, item: volume.item }
+    }
+
+    /// What a label set needs; none where it begins empty.
+    pub fn of_labels(set: &LabelSet) -> Option<Self> {
+        Some(Self { source: set.source.clone()?, kind: Kind::Volume, item: set.item })
     }
 
     /// What an implant needs.
@@ -123,6 +129,7 @@ pub enum AssetError {
 #[derive(Debug, Clone, Default)]
 pub struct Assets {
     loaded: BTreeMap<Key, Arc<Asset>>,
+    label_grids: LabelGrids,
 }
 
 impl Assets {
@@ -151,6 +158,20 @@ impl Assets {
         }
     }
 
+    /// The labels of a set with what was painted over them, where its source is loaded; where it has none, where its
+    /// volume is.
+    pub fn labels(&self, case: &Case, set: &LabelSet) -> Option<LabelGrid> {
+        let base = match Key::of_labels(set) {
+            None => self.grid(case.volume(&set.volume)?)?,
+            Some(key) => match &self.loaded.get(&key)?.data {
+                Data::Grid(grid) => Arc::clone(grid),
+                Data::Steps(steps) => steps.grid(0)?,
+                Data::Mesh(_) => return None,
+            },
+        };
+        Some(self.label_grids.grid(set, &base))
+    }
+
     /// Everything known about some data, where loaded.
     pub fn asset(&self, key: &Key) -> Option<&Arc<Asset>> {
         self.loaded.get(key)
@@ -172,7 +193,10 @@ impl Assets {
     pub fn missing(&self, case: &Case) -> Vec<Key> {
         let volumes = case.volumes.iter().filter(|v| v.visible).map(Key::of_volume);
         let implants = case.implants.iter().filter(|i| i.visible).map(Key::of_implant);
-        let mut keys: Vec<Key> = volumes.chain(implants).filter(|k| !self.loaded.contains_key(k)).collect();
+        let on_shown = |l: &&LabelSet| l.visible && case.volume(&l.volume).is_some_and(|v| v.visible);
+        let labels = case.labels.iter().filter(on_shown).filter_map(Key::of_labels);
+        let mut keys: Vec<Key> =
+            volumes.chain(implants).chain(labels).filter(|k| !self.loaded.contains_key(k)).collect();
         keys.sort();
         keys.dedup();
         keys

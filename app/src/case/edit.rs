@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use render::scene::{Camera, CameraError, Shading, TextureFormat};
+use render::scene::{Camera, CameraError, Shading, TextureFormat, VolumeMode};
 use render::volume::{Affine, Cutter, CutterError, Point, Side, SpaceError, Transfer};
 use thiserror::Error;
 
+use super::labels::{self, LabelChange, LabelSet};
 use super::{Case, Fragment, Implant, NamedCutter, Volume, split};
 
 /// A change to a case. `id` names the thing changed.
@@ -28,12 +29,12 @@ pub enum Edit {
     },
     /// A new volume at the end of the list.
     AddVolume(Box<Volume>),
-    /// Takes a volume away. Refused while fragments are of it.
+    /// Takes a volume away, and the labels on it. Refused while fragments are of it.
     RemoveVolume {
         /// The volume.
         id: String,
     },
-    /// Another id; its fragments follow.
+    /// Another id; its fragments and labels follow.
     RenameVolume {
         /// The volume.
         id: String,
@@ -74,6 +75,36 @@ pub enum Edit {
         id: String,
         /// The lighting.
         shading: Shading,
+    },
+    /// What is drawn of it in 3D.
+    SetVolumeMode {
+        /// The volume.
+        id: String,
+        /// The mode.
+        mode: VolumeMode,
+    },
+    /// How much it counts where other volumes are in a section.
+    SetBlend {
+        /// The volume.
+        id: String,
+        /// 0 to 1.
+        blend: f64,
+    },
+    /// A new label set at the end of the list.
+    AddLabels(Box<LabelSet>),
+    /// Labels that were loaded as a volume become labels on another one, in one step.
+    MakeLabels {
+        /// The volume that holds labels; it is taken away.
+        id: String,
+        /// The volume that they are on.
+        volume: String,
+    },
+    /// A change to a label set.
+    ChangeLabels {
+        /// The set.
+        id: String,
+        /// What changes.
+        change: LabelChange,
     },
     /// A new cutter at the end of the list.
     AddCutter(NamedCutter),
@@ -273,6 +304,12 @@ pub enum EditError {
         /// As given.
         value: f64,
     },
+    /// Labels on themselves.
+    #[error("\"{id}\" cannot be labels on itself; choose another volume")]
+    OwnLabels {
+        /// The volume.
+        id: String,
+    },
     /// The cutters cannot split the volume.
     #[error("{0}")]
     Split(#[from] split::SplitError),
@@ -313,6 +350,7 @@ pub fn apply(case: &mut Case, edit: Edit) -> Result<(), EditError> {
                 return Err(EditError::InUse { kind: "volume", id, by });
             }
             case.volumes.retain(|v| v.id != id);
+            case.labels.retain(|l| l.volume != id);
         }
         Edit::RenameVolume { id, to } => {
             new_id("volume", &to, id != to && case.volume(&to).is_some())?;
@@ -320,12 +358,25 @@ pub fn apply(case: &mut Case, edit: Edit) -> Result<(), EditError> {
             for fragment in case.fragments.iter_mut().filter(|f| f.volume == id) {
                 fragment.volume.clone_from(&to);
             }
+            for labels in case.labels.iter_mut().filter(|l| l.volume == id) {
+                labels.volume.clone_from(&to);
+            }
         }
         Edit::SetVolumePose { id, pose } => volume_mut(case, &id)?.pose = rigid(&id, pose)?,
         Edit::SetVolumeVisible { id, visible } => volume_mut(case, &id)?.visible = visible,
         Edit::SetTexture { id, texture } => volume_mut(case, &id)?.texture = texture,
         Edit::SetTransfer { id, transfer } => volume_mut(case, &id)?.transfer = transfer,
         Edit::SetVolumeShading { id, shading } => volume_mut(case, &id)?.shading = shading,
+        Edit::SetVolumeMode { id, mode } => {
+            if let VolumeMode::Isosurface { value, opacity } = mode {
+                unit(opacity, "an isosurface's opacity")?;
+                finite(value, "an isosurface's value")?;
+            }
+            volume_mut(case, &id)?.mode = mode;
+        }
+        Edit::SetBlend { id, blend } => {
+            volume_mut(case, &id)?.blend = unit(blend, "a volume's blend")?;
+        }
         Edit::AddCutter(cutter) => {
             new_id("cutter", &cutter.id, case.cutter(&cutter.id).is_some())?;
             valid(&cutter.cutter)?;
@@ -379,6 +430,37 @@ pub fn apply(case: &mut Case, edit: Edit) -> Result<(), EditError> {
         }
         Edit::SetFragmentPose { id, pose } => fragment_mut(case, &id)?.pose = rigid(&id, pose)?,
         Edit::SetFragmentVisible { id, visible } => fragment_mut(case, &id)?.visible = visible,
+        other => apply_to_labels(case, other)?,
+    }
+    Ok(())
+}
+
+fn apply_to_labels(case: &mut Case, edit: Edit) -> Result<(), EditError> {
+    match edit {
+        Edit::AddLabels(set) => {
+            new_id("label set", &set.id, case.label_set(&set.id).is_some())?;
+            volume_mut(case, &set.volume)?;
+            for color in set.colors.values() {
+                labels::check_color(*color)?;
+            }
+            case.labels.push(*set);
+        }
+        Edit::MakeLabels { id, volume } => {
+            let made = volume_mut(case, &id)?.clone();
+            volume_mut(case, &volume)?;
+            if id == volume {
+                return Err(EditError::OwnLabels { id });
+            }
+            let mut set = LabelSet::new(case.free_labels_id(&id), volume, Some(made.source));
+            set.item = made.item;
+            apply(case, Edit::RemoveVolume { id })?;
+            case.labels.push(set);
+        }
+        Edit::ChangeLabels { id, change } => {
+            let missing = || EditError::Missing { kind: "label set", id: id.clone() };
+            let index = case.labels.iter().position(|l| l.id == id).ok_or_else(missing)?;
+            labels::apply(&mut case.labels, index, change)?;
+        }
         implant => apply_to_implants(case, implant)?,
     }
     Ok(())
@@ -425,6 +507,11 @@ impl Edit {
         if std::mem::discriminant(self) != std::mem::discriminant(earlier) {
             return false;
         }
+        if let (Self::ChangeLabels { id: a, change }, Self::ChangeLabels { id: b, change: before }) =
+            (self, earlier)
+        {
+            return a == b && change.continues(before);
+        }
         match (self.dragged(), earlier.dragged()) {
             (Some(a), Some(b)) => a == b,
             _ => false,
@@ -437,6 +524,8 @@ impl Edit {
             Self::SetName(_) | Self::SetBackground(_) => Some(""),
             Self::SetVolumePose { id, .. }
             | Self::SetTransfer { id, .. }
+            | Self::SetBlend { id, .. }
+            | Self::SetVolumeMode { id, .. }
             | Self::SetCutter { id, .. }
             | Self::SetFragmentPose { id, .. }
             | Self::SetImplantPose { id, .. }
@@ -578,6 +667,10 @@ fn unit(value: f64, what: &'static str) -> Result<f64, EditError> {
     } else {
         Err(EditError::Range { what, range: "between 0 and 1", value })
     }
+}
+
+fn finite(value: f64, what: &'static str) -> Result<(), EditError> {
+    if value.is_finite() { Ok(()) } else { Err(EditError::Range { what, range: "finite", value }) }
 }
 
 fn unit_color(color: [f64; 3], what: &'static str) -> Result<[f64; 3], EditError> {

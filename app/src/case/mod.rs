@@ -12,7 +12,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use render::scene::{Camera, Piece, Shading, TextureFormat};
+use render::scene::{Camera, Piece, Shading, TextureFormat, VolumeMode};
 use render::volume::{Affine, Cutter, Side, Transfer};
 use serde_json::{Map, Value};
 
@@ -20,6 +20,8 @@ pub mod assets;
 pub mod edit;
 pub mod file;
 pub mod history;
+pub mod label_grid;
+pub mod labels;
 mod read;
 pub mod split;
 mod write;
@@ -28,6 +30,7 @@ pub use assets::Assets;
 pub use edit::{Edit, EditError};
 pub use file::FileError;
 pub use history::History;
+pub use labels::LabelSet;
 
 /// Keys of a file that this version does not know, kept as they were.
 pub type Other = Map<String, Value>;
@@ -94,6 +97,10 @@ pub struct Volume {
     pub transfer_other: Other,
     /// Lighting.
     pub shading: Shading,
+    /// What is drawn of it in 3D.
+    pub mode: VolumeMode,
+    /// How much it counts where other volumes are in a section; 0 to 1.
+    pub blend: f64,
     /// Unknown keys.
     pub other: Other,
 }
@@ -112,6 +119,8 @@ impl Volume {
             transfer,
             transfer_other: Other::new(),
             shading: Shading::None,
+            mode: VolumeMode::Composite,
+            blend: 1.0,
             other: Other::new(),
         }
     }
@@ -227,6 +236,8 @@ pub struct Case {
     pub fragments: Vec<Fragment>,
     /// Surfaces.
     pub implants: Vec<Implant>,
+    /// What is painted on volumes.
+    pub labels: Vec<LabelSet>,
     /// The view; none fits everything visible, seen from the front.
     pub camera: Option<Camera>,
     /// Unknown keys of the camera.
@@ -256,6 +267,16 @@ impl Case {
     /// The implant of that id.
     pub fn implant(&self, id: &str) -> Option<&Implant> {
         self.implants.iter().find(|i| i.id == id)
+    }
+
+    /// The label set of that id.
+    pub fn label_set(&self, id: &str) -> Option<&LabelSet> {
+        self.labels.iter().find(|l| l.id == id)
+    }
+
+    /// The label set that is drawn on a volume: the first visible one.
+    pub fn labels_of(&self, volume: &str) -> Option<&LabelSet> {
+        self.labels.iter().find(|l| l.volume == volume && l.visible)
     }
 
     /// The fragments of a volume.
@@ -300,6 +321,11 @@ impl Case {
     /// A free fragment id like `wish`.
     pub fn free_fragment_id(&self, wish: &str) -> String {
         Self::free_id(wish, self.fragments.iter().map(|f| f.id.as_str()))
+    }
+
+    /// A free id of a label set like `wish`.
+    pub fn free_labels_id(&self, wish: &str) -> String {
+        Self::free_id(wish, self.labels.iter().map(|l| l.id.as_str()))
     }
 
     /// A free implant id like `wish`.

@@ -8,12 +8,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use render::scene::{Camera, Projection, Shading, TextureFormat};
+use render::scene::{Camera, Projection, Shading, TextureFormat, VolumeMode};
 use render::volume::TransferError;
 use render::volume::{Affine, ControlPoint, Cutter, CutterError, Point, Side, SpaceError, Transfer, Vector};
 use serde_json::{Map, Value};
 
 use super::{Case, Fragment, Implant, NamedCutter, Other, Source, Volume};
+
+mod extras;
 
 /// A field that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -91,13 +93,15 @@ pub(super) fn case(document: Map<String, Value>, folder: &Path) -> Read<Case> {
     let cutters = fields.list("cutters", cutter)?;
     let fragments = fields.list("fragments", fragment)?;
     let implants = fields.list("implants", |v, at| implant(v, at, folder))?;
+    let labels = fields.list("labels", |v, at| extras::labels(v, at, folder))?;
     let (camera, camera_other) = match fields.take("camera") {
         Some((value, at)) => camera(value, at).map(|(camera, other)| (Some(camera), other))?,
         None => (None, Other::new()),
     };
     let background = fields.or("background", [0.0; 3], unit_numbers)?;
     let other = fields.map;
-    let case = Case { name, volumes, cutters, fragments, implants, camera, camera_other, background, other };
+    let case =
+        Case { name, volumes, cutters, fragments, implants, labels, camera, camera_other, background, other };
     check_references(&case)?;
     Ok(case)
 }
@@ -119,6 +123,13 @@ fn check_references(case: &Case) -> Read<()> {
     unique("cutters", case.cutters.iter().map(|c| c.id.as_str()).collect())?;
     unique("fragments", case.fragments.iter().map(|f| f.id.as_str()).collect())?;
     unique("implants", case.implants.iter().map(|i| i.id.as_str()).collect())?;
+    unique("labels", case.labels.iter().map(|l| l.id.as_str()).collect())?;
+    for (i, labels) in case.labels.iter().enumerate() {
+        if case.volume(&labels.volume).is_none() {
+            let text = format!("names volume \"{}\", which is not among the volumes", labels.volume);
+            return fault(format!("labels[{i}].volume"), text, "name one of the volumes");
+        }
+    }
     for (i, fragment) in case.fragments.iter().enumerate() {
         if case.volume(&fragment.volume).is_none() {
             let text = format!("names volume \"{}\", which is not among the volumes", fragment.volume);
@@ -145,6 +156,8 @@ fn volume(value: Value, at: String, folder: &Path) -> Read<Volume> {
     let (value, at) = fields.need("transfer")?;
     let (transfer, transfer_other) = transfer(value, at)?;
     let shading = fields.or("shading", Shading::None, |v, at| shading(v, at, "gradient"))?;
+    let mode = fields.or("mode", VolumeMode::Composite, extras::mode)?;
+    let blend = fields.or("blend", 1.0, extras::unit)?;
     let transfer = Arc::new(transfer);
     Ok(Volume {
         id,
@@ -157,6 +170,8 @@ fn volume(value: Value, at: String, folder: &Path) -> Read<Volume> {
         transfer,
         transfer_other,
         shading,
+        mode,
+        blend,
         other: fields.map,
     })
 }

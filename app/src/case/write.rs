@@ -3,11 +3,11 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use render::scene::{Projection, Shading};
+use render::scene::{Projection, Shading, VolumeMode};
 use render::volume::{Cutter, Side};
 use serde_json::{Map, Value, json};
 
-use super::{Case, Fragment, Implant, NamedCutter, Other, Source, Volume};
+use super::{Case, Fragment, Implant, LabelSet, NamedCutter, Other, Source, Volume};
 
 /// A source whose path is not Unicode, which JSON cannot hold.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,6 +30,13 @@ pub(super) fn case(case: &Case, folder: &Path) -> Result<String, NotUnicode> {
     put(&mut map, "cutters", case.cutters.iter().map(cutter).collect());
     put(&mut map, "fragments", case.fragments.iter().map(fragment).collect());
     put(&mut map, "implants", Value::Array(implants));
+    if !case.labels.is_empty() {
+        let mut all = Vec::new();
+        for l in &case.labels {
+            all.push(labels(l, folder)?);
+        }
+        put(&mut map, "labels", Value::Array(all));
+    }
     if let Some(camera) = &case.camera {
         let mut at = Map::new();
         put(&mut at, "eye", json!(camera.eye.coords.as_slice()));
@@ -81,6 +88,16 @@ fn volume(v: &Volume, folder: &Path) -> Result<Value, NotUnicode> {
     put(&mut transfer, "unit_mm", json!(v.transfer.unit_mm()));
     put(&mut map, "transfer", with(transfer, &v.transfer_other));
     put(&mut map, "shading", json!(shading_name(v.shading, "gradient")));
+    match v.mode {
+        VolumeMode::Composite => {}
+        VolumeMode::Mip => put(&mut map, "mode", json!("mip")),
+        VolumeMode::Isosurface { value, opacity } => {
+            put(&mut map, "mode", json!({"isosurface": {"value": value, "opacity": opacity}}));
+        }
+    }
+    if v.blend != 1.0 {
+        put(&mut map, "blend", json!(v.blend));
+    }
     Ok(with(map, &v.other))
 }
 
@@ -145,6 +162,22 @@ fn implant(i: &Implant, folder: &Path) -> Result<Value, NotUnicode> {
     put(&mut map, "visible", json!(i.visible));
     put(&mut map, "shading", json!(shading_name(i.shading, "headlight")));
     Ok(with(map, &i.other))
+}
+
+fn labels(l: &LabelSet, folder: &Path) -> Result<Value, NotUnicode> {
+    let mut map = Map::new();
+    put(&mut map, "id", json!(l.id));
+    put(&mut map, "volume", json!(l.volume));
+    if let Some(from) = &l.source {
+        put(&mut map, "source", source(from, folder)?);
+    }
+    if l.item > 0 {
+        put(&mut map, "item", json!(l.item));
+    }
+    let colors: Map<String, Value> = l.colors.iter().map(|(n, c)| (n.to_string(), json!(c))).collect();
+    put(&mut map, "colors", Value::Object(colors));
+    put(&mut map, "visible", json!(l.visible));
+    Ok(with(map, &l.other))
 }
 
 fn source(source: &Source, folder: &Path) -> Result<Value, NotUnicode> {

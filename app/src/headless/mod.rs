@@ -7,6 +7,7 @@ use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use ::render::cpu::CpuError;
 use ::render::gpu::GpuError;
 use ::render::reference::ReferenceError;
 use thiserror::Error;
@@ -24,6 +25,7 @@ pub mod input;
 mod play;
 pub mod plot;
 pub mod render;
+pub mod section;
 mod series;
 
 /// Why a job was not done: one sentence, and the program's exit code.
@@ -51,6 +53,9 @@ pub enum Failure {
     /// The GPU drew nothing.
     #[error("{0}")]
     Gpu(#[from] GpuError),
+    /// The processor drew nothing.
+    #[error("{0}")]
+    Cpu(#[from] CpuError),
     /// The reference drew nothing.
     #[error("{0}")]
     Reference(#[from] ReferenceError),
@@ -76,6 +81,7 @@ impl Failure {
             | Self::Data(_)
             | Self::Unfit(_)
             | Self::Gpu(GpuError::Camera(_))
+            | Self::Cpu(CpuError::Camera(_))
             | Self::Reference(ReferenceError::Camera(_)) => 3,
             Self::Gpu(GpuError::NoAdapter { .. } | GpuError::NoDevice { .. }) => 4,
             _ => 1,

@@ -1,14 +1,15 @@
 //! `render`: one picture of a case, by the GPU or by the reference.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 use ::render::TextureSummary;
-use ::render::gpu::Gpu;
+use ::render::cpu::{self, CpuRenderer};
+use ::render::gpu::{Gpu, GpuError};
 use ::render::image::FloatImage;
+use ::render::recovery::RecoveringRenderer;
 use ::render::reference;
-use ::render::renderer::{Quality, Renderer, Stats};
+use ::render::renderer::{Quality, Stats};
 use ::render::scene::Scene;
 use serde_json::{Map, Value, json};
 
@@ -36,7 +37,9 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let load_ms = ms(begin);
     let scene = scene::scene(&input.case, &input.assets);
     let (picture, mut stats, statement) = match args.backend {
-        Backend::Gpu => by_gpu(&scene, args)?,
+        Backend::Auto => by_either(&scene, args)?,
+        Backend::Gpu => by_gpu(Gpu::headless()?, &scene, args)?,
+        Backend::Cpu => by_cpu(&scene, args)?,
         Backend::Reference => by_reference(&scene, args.size)?,
     };
     let begin = Instant::now();
@@ -69,22 +72,52 @@ fn kind(path: &Path) -> Result<Kind, Failure> {
 
 type Drawn = (FloatImage, Map<String, Value>, String);
 
-fn by_gpu(scene: &Scene, args: &RenderArgs) -> Result<Drawn, Failure> {
-    let gpu = Arc::new(Gpu::headless()?);
-    let mut renderer = Renderer::new(Arc::clone(&gpu))?;
-    let quality = match args.quality {
+/// By the GPU, unless it is none and the processor shows the same, or only the processor can.
+fn by_either(scene: &Scene, args: &RenderArgs) -> Result<Drawn, Failure> {
+    if cpu::alone_shows(scene) {
+        return by_cpu(scene, args);
+    }
+    match Gpu::headless() {
+        Ok(gpu) if gpu.caps().software && cpu::shows(scene) => by_cpu(scene, args),
+        Ok(gpu) => by_gpu(gpu, scene, args),
+        Err(GpuError::NoAdapter { .. }) if cpu::shows(scene) => by_cpu(scene, args),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn quality(args: &RenderArgs) -> Quality {
+    match args.quality {
         QualityName::Draft => Quality::Draft,
         QualityName::Good => Quality::Good,
         QualityName::Finest => Quality::Finest,
-    };
-    let stats = renderer.render(scene, args.size, quality)?;
-    let picture = renderer.read()?;
+    }
+}
+
+fn by_cpu(scene: &Scene, args: &RenderArgs) -> Result<Drawn, Failure> {
+    let terminal = Terminal::default();
+    let progress = |done: usize, total: usize| terminal.step("drawing", done, total);
+    let quality = quality(args);
+    let (picture, stats) = CpuRenderer::new().render(scene, args.size, quality, &progress)?;
+    let mut map = Map::new();
+    map.insert("backend".to_owned(), json!("cpu"));
+    map.insert("threads".to_owned(), json!(rayon::current_num_threads()));
+    map.insert("quality_voxels".to_owned(), json!(quality.voxels()));
+    figures(&stats, &mut map);
+    map.insert("statement".to_owned(), json!(""));
+    Ok((picture, map, String::new()))
+}
+
+fn by_gpu(gpu: Gpu, scene: &Scene, args: &RenderArgs) -> Result<Drawn, Failure> {
+    let adapter = gpu.adapter().to_owned();
+    let mut renderer = RecoveringRenderer::on(gpu, Gpu::headless)?;
+    let quality = quality(args);
+    let (picture, stats) = renderer.render(scene, args.size, quality)?;
     for note in &stats.notes {
         log::warn!("{note}");
     }
     let mut map = Map::new();
     map.insert("backend".to_owned(), json!("gpu"));
-    map.insert("adapter".to_owned(), json!(gpu.adapter()));
+    map.insert("adapter".to_owned(), json!(adapter));
     map.insert("quality_voxels".to_owned(), json!(quality.voxels()));
     figures(&stats, &mut map);
     let statement = statement(&stats.textures);
@@ -124,6 +157,10 @@ pub(super) fn figures(stats: &Stats, map: &mut Map<String, Value>) {
         "off_screen_skipped": stats.off_screen_skipped,
         "saturate_looks": stats.saturate_looks,
         "layers": stats.layers,
+        "tiles": stats.tiles,
+        "tiles_skipped": stats.tiles_skipped,
+        "cells": stats.cells,
+        "pixels_finished": stats.pixels_finished,
         "bands": stats.bands,
         "textures": textures,
         "notes": stats.notes,

@@ -16,7 +16,7 @@ use super::context::{Request, Selection, ToolContext};
 use super::dialogs::{Dialog, Question};
 use super::overlay::Overlay;
 use super::pacer::{Need, Pacer};
-use super::pointer::PointerEvent;
+use super::pointer::{PointerEvent, SectionEvent};
 use super::registry::Registry;
 use super::screenshot::{Screenshot, ScreenshotError};
 use super::section_view::{SectionInput, SectionView};
@@ -25,11 +25,11 @@ use super::spatial_view::{SpatialAnswer, SpatialInput, SpatialView};
 use super::status::{Status, status_ui};
 use super::tool::ToolId;
 use super::viewport::Viewport;
-use super::views::{self, Orientation, ViewId, Views};
+use super::views::{Orientation, ViewId, Views};
 use super::{help, layout, pick};
 use crate::case::{Case, Edit, assets};
-use crate::scene;
 use crate::ui::theme;
+use crate::{scene, sections};
 
 const UNDO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Z);
 const REDO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
@@ -313,7 +313,7 @@ impl Host {
             match view {
                 ViewId::Spatial => self.spatial_ui(ui, rect, &scene, ball, wishes),
                 ViewId::Section(orientation) => {
-                    self.section_ui(ui, rect, orientation, ball, &layers, &names);
+                    self.section_ui(ui, (rect, orientation), ball, (&layers, &names), wishes);
                 }
             }
         }
@@ -322,23 +322,38 @@ impl Host {
     fn section_ui(
         &mut self,
         ui: &mut Ui,
-        rect: Rect,
-        orientation: Orientation,
+        (rect, orientation): (Rect, Orientation),
         ball: Ball,
-        layers: &[Layer],
-        names: &[(String, &'static str)],
+        (layers, names): (&[Layer], &[(String, &'static str)]),
+        wishes: &mut Wishes,
     ) {
+        let windowed = self.selection.volume.clone();
+        let mut tool = self.active.and_then(|id| self.registry.tool_mut(id));
         let input = SectionInput {
             case: self.session.case(),
             assets: self.session.assets(),
             layers,
             names,
-            windowed: self.selection.volume.as_deref(),
+            windowed: windowed.as_deref(),
             ball,
             moving: ui.input(|i| i.pointer.any_down()),
+            brush_mm: tool.as_ref().and_then(|tool| tool.brush_mm()),
+        };
+        let mut context = ToolContext::new(
+            self.session.case(),
+            self.session.assets(),
+            &mut self.selection,
+            &mut self.views,
+            &mut wishes.edits,
+            &mut wishes.requests,
+        );
+        let mut pass_on = |context: &mut ToolContext<'_>, event: &SectionEvent| {
+            let Some(tool) = &mut tool else { return false };
+            tool.section_pointer(context, event);
+            context.is_captured()
         };
         let view = &mut self.sections[orientation.index()];
-        view.ui(ui, rect, orientation, &input, &mut self.views);
+        view.ui(ui, rect, orientation, &input, &mut context, &mut pass_on);
     }
 
     fn spatial_ui(&mut self, ui: &mut Ui, rect: Rect, scene: &Scene, ball: Ball, wishes: &mut Wishes) {
@@ -622,7 +637,7 @@ fn names(case: &Case, loaded: &assets::Assets) -> Vec<(String, &'static str)> {
     let named = shown.filter_map(|volume| {
         let grid = loaded.grid(volume)?;
         let modality = loaded.asset(&assets::Key::of_volume(volume)).and_then(|a| a.modality.clone());
-        let is_ct = modality.map_or(grid.range()[0] < views::AIR_BELOW, |m| m == "CT");
+        let is_ct = modality.map_or(grid.range()[0] < sections::AIR_BELOW, |m| m == "CT");
         let is_lossy = loaded.steps(volume).is_some_and(|steps| steps.is_lossy());
         let unit = match (is_ct, is_lossy) {
             (true, false) => " HU",

@@ -14,8 +14,10 @@ const SPATIAL: [[&str; 2]; 7] = [
     ["Escape", "put back what is being dragged"],
 ];
 
-const SECTIONS: [[&str; 2]; 6] = [
+const SECTIONS: [[&str; 2]; 8] = [
     ["Left click or drag", "move the crosshair; the other views follow"],
+    ["Left drag of a dot on a line", "turn that section"],
+    ["Left drag with the Labels tool", "paint"],
     ["Wheel", "next slice"],
     ["Right drag", "window: width across, level upwards"],
     ["Ctrl + wheel", "zoom"],

@@ -117,6 +117,8 @@ mod tests {
             shading: Shading::None,
             texture: TextureFormat::Auto,
             pieces: vec![Piece::whole()],
+            labels: None,
+            mode: Default::default(),
         };
         let camera = Facing::Anterior.camera(ball());
         Scene { volumes: vec![item], meshes: Vec::new(), camera, background: [0.0; 3] }

@@ -39,3 +39,12 @@ impl PointerEvent {
         self.lens.project(p).map_or(f64::INFINITY, |[x, y]| (x - self.at[0]).hypot(y - self.at[1]))
     }
 }
+
+/// One thing the pointer did in a section.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SectionEvent {
+    /// What happened.
+    pub phase: Phase,
+    /// The place in the section's plane; world mm.
+    pub place: render::volume::Point,
+}

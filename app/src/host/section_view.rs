@@ -1,7 +1,8 @@
 //! One cross-section on the screen: its picture, what lies over it, and what the pointer does in it.
 //!
-//! Left button: crosshair. Right drag: window (across) and level (along). Wheel: next slice. Ctrl with
-//! the wheel: zoom. Middle drag, or shift with the left: pan. Double click: this view alone, and back.
+//! Left button: crosshair, or on a dot of another section's line: turn that section; or what the chosen tool does.
+//! Right drag: window (across) and level (along). Wheel: next slice. Ctrl with the wheel: zoom. Middle drag, or
+//! shift with the left: pan. Double click: this view alone, and back.
 
 use std::sync::Arc;
 
@@ -9,12 +10,15 @@ use egui::{
     Align2, Color32, ColorImage, FontId, Painter, PointerButton, Pos2, Rect, Sense, Stroke, TextureHandle,
     TextureOptions, Ui, pos2, vec2,
 };
-use render::section::{self, Layer, Section};
+use render::section::{self, Layer, Section, SlabMode};
 use render::volume::{Point, TriangleMesh, Vector};
 
 use super::camera::{Ball, Facing};
+use super::context::ToolContext;
+use super::pointer::{Phase, SectionEvent};
 use super::views::{Orientation, ViewId, Views};
 use crate::case::{Assets, Case};
+use crate::sections;
 use crate::ui::theme;
 
 /// What a picture depends on; a layer's samples by the address of its grid, which is never changed.
@@ -30,7 +34,9 @@ struct LayerKey {
     pose: render::volume::Affine,
     pieces: Vec<render::scene::Piece>,
     window: section::Window,
-    share: f64,
+    weight: f64,
+    /// The address of the labels' grid, and their colours.
+    labels: Option<(usize, Arc<[[f64; 4]]>)>,
 }
 
 impl LayerKey {
@@ -40,7 +46,8 @@ impl LayerKey {
             pose: layer.pose,
             pieces: layer.pieces.clone(),
             window: layer.window,
-            share: layer.share,
+            weight: layer.weight,
+            labels: layer.labels.as_ref().map(|l| (Arc::as_ptr(&l.grid) as usize, Arc::clone(&l.colors))),
         }
     }
 }
@@ -54,9 +61,22 @@ struct Outline {
     lines: Vec<[Point; 2]>,
 }
 
+/// What the drag going on does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Drag {
+    /// There is none, or the crosshair follows it.
+    #[default]
+    Crosshair,
+    /// The tool has it.
+    Tool,
+    /// Another section turns.
+    Turn(Orientation),
+}
+
 /// One section's texture and what it was made from.
 #[derive(Default)]
 pub struct SectionView {
+    drag: Drag,
     texture: Option<TextureHandle>,
     key: Option<Key>,
     outlines: Vec<Outline>,
@@ -85,17 +105,23 @@ pub struct SectionInput<'a> {
     pub ball: Ball,
     /// Whether something is being dragged: then half the pixels each way will do.
     pub moving: bool,
+    /// The radius of the tool's brush; mm.
+    pub brush_mm: Option<f64>,
 }
 
+/// Gets the pointer before the section does, and says whether it takes the drag.
+pub type PassOn<'a> = dyn FnMut(&mut ToolContext<'_>, &SectionEvent) -> bool + 'a;
+
 impl SectionView {
-    /// Draws the section in `rect`, changes `views` as the pointer asks.
+    /// Draws the section in `rect`, changes the context's views as the pointer asks. `tool` gets the pointer first.
     pub fn ui(
         &mut self,
         ui: &mut Ui,
         rect: Rect,
         orientation: Orientation,
         input: &SectionInput<'_>,
-        views: &mut Views,
+        ctx: &mut ToolContext<'_>,
+        tool: &mut PassOn<'_>,
     ) {
         let response = ui.interact(rect, ui.scope_id().with(orientation.title()), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, orientation.title()));
@@ -103,9 +129,13 @@ impl SectionView {
         let pixels_per_point = f64::from(ui.ctx().pixels_per_point());
         let painter = ui.painter_at(rect);
         painter.rect_filled(rect, 0.0, Color32::BLACK);
-        if let Ok(in_points) = views.section(orientation, input.ball, size, 1.0) {
-            act(ui, &response, rect, &in_points, orientation, input, views);
+        if let Ok(section) = ctx.views.section(orientation, input.ball, size, 1.0) {
+            let map = OnScreen { section, rect };
+            if !self.drags(ui, &response, &map, orientation, ctx, tool) {
+                act(ui, &response, rect, &section, orientation, input, ctx.views);
+            }
         }
+        let views = &*ctx.views;
         // Anew, since the pointer may just have moved it.
         let Ok(in_points) = views.section(orientation, input.ball, size, 1.0) else { return };
         let density = if input.moving { 0.5 * pixels_per_point } else { pixels_per_point };
@@ -116,9 +146,14 @@ impl SectionView {
         self.outlines_ui(&painter, &map, input);
         cutters_ui(&painter, &map, input);
         if let Some(crosshair) = views.crosshair {
-            crosshair_ui(&painter, &map, orientation, &crosshair);
+            crosshair_ui(&painter, &map, orientation, views, &crosshair, response.hover_pos());
+        }
+        if let (Some(radius_mm), Some(at)) = (input.brush_mm, response.hover_pos()) {
+            let radius = (radius_mm / map.section.mm_per_pixel()) as f32;
+            painter.circle_stroke(at, radius, Stroke::new(1.2, theme::HOT));
         }
         letters_ui(&painter, &map);
+        legend_ui(&painter, rect, input);
         words_ui(&painter, &map, &response, orientation, input, views);
         painter.rect_stroke(
             rect,
@@ -126,6 +161,55 @@ impl SectionView {
             Stroke::new(1.0, orientation.color().gamma_multiply(0.55)),
             egui::StrokeKind::Inside,
         );
+    }
+
+    /// What a drag with the left button does before the crosshair gets it: turning another section by its dot, or
+    /// what the tool makes of it. Whether it was that.
+    fn drags(
+        &mut self,
+        ui: &Ui,
+        response: &egui::Response,
+        map: &OnScreen,
+        orientation: Orientation,
+        ctx: &mut ToolContext<'_>,
+        tool: &mut PassOn<'_>,
+    ) -> bool {
+        let (origin, shift) = ui.input(|i| (i.pointer.press_origin(), i.modifiers.shift));
+        let Some(at) = response.interact_pointer_pos() else { return false };
+        let event = |phase, at: Pos2| SectionEvent { phase, place: map.point(at) };
+        if response.drag_started_by(PointerButton::Primary) && !shift {
+            let origin = origin.unwrap_or(at);
+            let held = ctx.views.crosshair.and_then(|crosshair| {
+                turning_dots(map, orientation, ctx.views, &crosshair)
+                    .into_iter()
+                    .find(|(_, dot)| dot.distance(origin) <= DOT_REACH)
+            });
+            self.drag = match held {
+                Some((other, _)) => Drag::Turn(other),
+                None if tool(ctx, &event(Phase::Press, origin)) => Drag::Tool,
+                None => Drag::Crosshair,
+            };
+        } else if response.clicked() && tool(ctx, &event(Phase::Press, at)) {
+            tool(ctx, &event(Phase::Release, at));
+            return true;
+        }
+        let taken = self.drag != Drag::Crosshair;
+        if response.dragged_by(PointerButton::Primary) {
+            match self.drag {
+                Drag::Tool => {
+                    tool(ctx, &event(Phase::Drag, at));
+                }
+                Drag::Turn(other) => turn(map, other, ctx.views, at - response.drag_delta(), at),
+                Drag::Crosshair => {}
+            }
+        }
+        if response.drag_stopped() {
+            if self.drag == Drag::Tool {
+                tool(ctx, &event(Phase::Release, at));
+            }
+            self.drag = Drag::Crosshair;
+        }
+        taken
     }
 
     fn picture(
@@ -260,11 +344,10 @@ fn act(
         state.mm_per_point = Some((section.mm_per_pixel() / f64::from(zoom)).clamp(0.005, 20.0));
     } else if wheel != 0.0 {
         // Half a voxel a notch's quarter: slices pass one by one, and a swipe goes far.
-        let step_mm = slice_step_mm(input.layers, orientation);
-        let axis = orientation.normal_axis();
-        let mut crosshair = views.crosshair.unwrap_or(input.ball.centre);
-        crosshair[axis] += f64::from(wheel) / WHEEL_POINTS * step_mm;
-        views.crosshair = Some(crosshair);
+        let normal = views.normal(orientation);
+        let step_mm = slice_step_mm(input.layers, &normal);
+        let crosshair = views.crosshair.unwrap_or(input.ball.centre);
+        views.crosshair = Some(crosshair + normal * (f64::from(wheel) / WHEEL_POINTS * step_mm));
     }
 }
 
@@ -272,15 +355,13 @@ fn act(
 const WHEEL_POINTS: f64 = 40.0;
 
 /// The distance between slices across a section: the finest spacing of the first volume along it.
-fn slice_step_mm(layers: &[Layer], orientation: Orientation) -> f64 {
-    let mut normal = Vector::zeros();
-    normal[orientation.normal_axis()] = 1.0;
+fn slice_step_mm(layers: &[Layer], normal: &Vector) -> f64 {
     let step = |layer: &Layer| {
         let linear = (layer.pose * *layer.grid.world_from_voxel()).linear();
         let columns = [0, 1, 2].map(|c| linear.column(c).into_owned());
         // The axis of the grid that runs most nearly across.
         let best = columns.iter().max_by(|a, b| {
-            let part = |v: &Vector| v.dot(&normal).abs() / v.norm();
+            let part = |v: &Vector| v.dot(normal).abs() / v.norm();
             part(a).total_cmp(&part(b))
         });
         best.map_or(1.0, |v| v.norm())
@@ -296,37 +377,92 @@ fn windowed(window: section::Window, drag: [f64; 2]) -> section::Window {
 
 fn cutters_ui(painter: &Painter, map: &OnScreen, input: &SectionInput<'_>) {
     let reach_mm = 4.0 * input.ball.radius_mm;
-    for cutter in &input.case.cutters {
-        for line in section::cutter_outline(&map.section, &cutter.cutter, reach_mm) {
-            let line: Vec<Pos2> = line.iter().map(|p| map.place(p)).collect();
-            painter.add(egui::Shape::line(line, Stroke::new(1.2, theme::CUTTER)));
+    for line in sections::cutter_lines(input.case, input.layers, &map.section, reach_mm) {
+        let line: Vec<Pos2> = line.iter().map(|p| map.place(p)).collect();
+        painter.add(egui::Shape::line(line, Stroke::new(1.2, theme::CUTTER)));
+    }
+}
+
+/// The direction on the screen of another section's line; none where it lies in the same plane.
+fn line_on_screen(map: &OnScreen, views: &Views, other: Orientation) -> Option<egui::Vec2> {
+    let along = map.section.forward().cross(&views.normal(other)).try_normalize(1e-6)?;
+    let [x, y] = [map.section.right(), map.section.down()].map(|axis| axis.dot(&along) as f32);
+    Some(vec2(x, y).normalized())
+}
+
+/// How near to a dot the pointer takes it; points.
+const DOT_REACH: f32 = 9.0;
+
+/// The dots on the other sections' lines that turn them: each with the section it turns.
+fn turning_dots(
+    map: &OnScreen,
+    orientation: Orientation,
+    views: &Views,
+    crosshair: &Point,
+) -> Vec<(Orientation, Pos2)> {
+    let (middle, reach) = (map.place(crosshair), 0.36 * map.rect.width().min(map.rect.height()));
+    let others = Orientation::ALL.into_iter().filter(|o| *o != orientation);
+    others
+        .filter_map(|other| Some((other, line_on_screen(map, views, other)? * reach)))
+        .flat_map(|(other, along)| [(other, middle + along), (other, middle - along)])
+        .filter(|(_, dot)| map.rect.contains(*dot))
+        .collect()
+}
+
+/// Turns another section about this one's normal by as much as the pointer went about the crosshair.
+fn turn(map: &OnScreen, other: Orientation, views: &mut Views, from: Pos2, to: Pos2) {
+    let Some(crosshair) = views.crosshair else { return };
+    let [before, after] = [from, to].map(|at| map.point(at) - crosshair);
+    let axis = map.section.forward();
+    let angle_rad = axis.dot(&before.cross(&after)).atan2(before.dot(&after));
+    views.turn(other, &axis, angle_rad);
+}
+
+/// The other two sections as lines, each in its colour, open in the middle so that the spot is seen, with a dot
+/// towards either end that turns it.
+fn crosshair_ui(
+    painter: &Painter,
+    map: &OnScreen,
+    orientation: Orientation,
+    views: &Views,
+    crosshair: &Point,
+    pointer: Option<Pos2>,
+) {
+    const OPEN: f32 = 9.0;
+    let at = map.place(crosshair);
+    let far = map.rect.width() + map.rect.height();
+    for other in Orientation::ALL.into_iter().filter(|o| *o != orientation) {
+        let Some(along) = line_on_screen(map, views, other) else { continue };
+        let stroke = Stroke::new(1.0, other.color().gamma_multiply(0.8));
+        for along in [along, -along] {
+            painter.line_segment([at + along * OPEN, at + along * far], stroke);
+        }
+    }
+    if pointer.is_some() {
+        for (other, dot) in turning_dots(map, orientation, views, crosshair) {
+            let hot = pointer.is_some_and(|p| p.distance(dot) <= DOT_REACH);
+            let color = if hot { theme::HOT } else { other.color() };
+            painter.circle(dot, 4.0, color, Stroke::new(1.0, Color32::from_black_alpha(180)));
         }
     }
 }
 
-/// The other two sections as lines, each in its colour, open in the middle so that the spot is seen.
-fn crosshair_ui(painter: &Painter, map: &OnScreen, orientation: Orientation, crosshair: &Point) {
-    const OPEN: f32 = 9.0;
-    let at = map.place(crosshair);
-    let rect = map.rect;
-    for other in Orientation::ALL.into_iter().filter(|o| *o != orientation) {
-        let stroke = Stroke::new(1.0, other.color().gamma_multiply(0.8));
-        // Another section is seen as the line across its normal.
-        let upright = map.section.right()[other.normal_axis()].abs() > 0.5;
-        let lines = if upright {
-            [
-                [pos2(at.x, rect.top()), pos2(at.x, at.y - OPEN)],
-                [pos2(at.x, at.y + OPEN), pos2(at.x, rect.bottom())],
-            ]
-        } else {
-            [
-                [pos2(rect.left(), at.y), pos2(at.x - OPEN, at.y)],
-                [pos2(at.x + OPEN, at.y), pos2(rect.right(), at.y)],
-            ]
-        };
-        for line in lines {
-            painter.line_segment(line, stroke);
-        }
+/// The labels of the shown volumes, each with its colour, down the left side.
+fn legend_ui(painter: &Painter, rect: Rect, input: &SectionInput<'_>) {
+    const MOST: usize = 10;
+    let font = FontId::proportional(11.5);
+    let shown = input.case.volumes.iter().filter(|v| v.visible);
+    let sets = shown.filter_map(|v| input.case.labels_of(&v.id));
+    let rows = sets.flat_map(|set| {
+        let counts = input.assets.labels(input.case, set).map(|l| l.counts).unwrap_or_default();
+        let labels: Vec<u32> = counts.keys().copied().filter(|&n| set.color(n)[3] > 0.0).collect();
+        labels.into_iter().map(move |n| (set.color(n), format!("{} {n}", set.id)))
+    });
+    for (row, ([r, g, b, _], words)) in rows.take(MOST).enumerate() {
+        let at = rect.left_top() + vec2(8.0, 28.0 + 15.0 * row as f32);
+        let [r, g, b] = [r, g, b].map(|c| (c * 255.0).round() as u8);
+        painter.rect_filled(Rect::from_min_size(at, vec2(10.0, 10.0)), 1.0, Color32::from_rgb(r, g, b));
+        shadowed_ui(painter, at + vec2(15.0, -2.0), Align2::LEFT_TOP, &words, &font, theme::QUIET);
     }
 }
 
@@ -376,9 +512,7 @@ fn words_ui(
 ) {
     let font = FontId::proportional(12.5);
     let rect = map.rect;
-    let axis = orientation.normal_axis();
-    let place = views.crosshair.map_or_else(String::new, |c| format!("  {}", lps_part(axis, c[axis])));
-    let title = format!("{}{place}", orientation.title());
+    let title = title(orientation, views);
     shadowed_ui(
         painter,
         rect.left_top() + vec2(8.0, 6.0),
@@ -404,12 +538,34 @@ fn words_ui(
         let p = map.point(at);
         let named = input.layers.iter().zip(input.names);
         let values = named.filter_map(|(layer, (name, unit))| {
-            layer.value(&p).map(|value| format!("{name} {value:.0}{unit}"))
+            let label = match layer.label(&p) {
+                0 => String::new(),
+                label => format!(" (label {label})"),
+            };
+            layer.value(&p).map(|value| format!("{name} {value:.0}{unit}{label}"))
         });
         let words = std::iter::once(lps(&p)).chain(values).collect::<Vec<_>>().join("   ");
         let white = Color32::from_rgb(235, 238, 241);
         shadowed_ui(painter, rect.left_bottom() + vec2(8.0, -7.0), Align2::LEFT_BOTTOM, &words, &font, white);
     }
+}
+
+/// What a section is, where, and how thick: `"Axial  S 12.0 mm"`, `"Axial, turned 20.0°  MIP of 10.0 mm"`.
+fn title(orientation: Orientation, views: &Views) -> String {
+    let state = &views.sections[orientation.index()];
+    let (axis, turned_deg) = (orientation.normal_axis(), state.turn.angle().to_degrees());
+    let place = match views.crosshair {
+        _ if turned_deg > 0.005 => format!(", turned {turned_deg:.1}°"),
+        Some(crosshair) => format!("  {}", lps_part(axis, crosshair[axis])),
+        None => String::new(),
+    };
+    let slab = match state.slab.mode {
+        _ if state.slab.thickness_mm == 0.0 => String::new(),
+        SlabMode::Mean => format!("  mean of {:.1} mm", state.slab.thickness_mm),
+        SlabMode::Mip => format!("  MIP of {:.1} mm", state.slab.thickness_mm),
+        SlabMode::MinIp => format!("  MinIP of {:.1} mm", state.slab.thickness_mm),
+    };
+    format!("{}{place}{slab}", orientation.title())
 }
 
 /// A bar of a round length, a quarter of the view at most.
@@ -477,11 +633,33 @@ mod tests {
             pieces: vec![Piece::whole()],
             window: section::Window { level: 0.0, width: 1.0 },
             color: [1.0; 3],
-            share: 1.0,
+            weight: 1.0,
+            labels: None,
         };
-        let step = |o| slice_step_mm(std::slice::from_ref(&layer), o);
-        assert_eq!((step(Orientation::Coronal), step(Orientation::Axial)), (3.0, 0.5), "by direction");
-        assert_eq!(slice_step_mm(&[], Orientation::Axial), 1.0, "a millimetre where there is nothing");
+        let step = |normal| slice_step_mm(std::slice::from_ref(&layer), &normal);
+        assert_eq!((step(Vector::y()), step(Vector::z())), (3.0, 0.5), "by direction");
+        assert_eq!(slice_step_mm(&[], &Vector::z()), 1.0, "a millimetre where there is nothing");
+    }
+
+    #[test]
+    fn a_dot_turns_the_other_section_so_that_its_line_follows_the_pointer() {
+        let rect = Rect::from_min_size(pos2(0.0, 0.0), vec2(400.0, 300.0));
+        let mut views = Views { crosshair: Some(Point::new(1.0, 2.0, 3.0)), ..Views::new() };
+        let ball = Ball { centre: Point::new(1.0, 2.0, 3.0), radius_mm: 50.0 };
+        let section = views.section(Orientation::Axial, ball, [400.0, 300.0], 1.0).expect("section");
+        let map = OnScreen { section, rect };
+        let dots = turning_dots(&map, Orientation::Axial, &views, &Point::new(1.0, 2.0, 3.0));
+        assert_eq!(dots.len(), 4, "two on each line");
+        let (other, dot) = dots[0];
+        let middle = rect.center();
+        let to = middle + egui::emath::Rot2::from_angle(0.4) * (dot - middle);
+        turn(&map, other, &mut views, dot, to);
+        let after = turning_dots(&map, Orientation::Axial, &views, &Point::new(1.0, 2.0, 3.0));
+        assert!(after.iter().any(|(o, at)| *o == other && at.distance(to) < 1e-2), "it is under the pointer");
+        let turned = views.sections[other.index()].turn.angle();
+        assert!((turned - 0.4).abs() < 1e-6, "by as much: {turned}");
+        let words = title(other, &views);
+        assert!(words.contains("turned 22.9°"), "and it says so: {words}");
     }
 
     #[test]

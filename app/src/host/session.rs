@@ -12,6 +12,7 @@ use crate::case::{Assets, Case, Edit, History, Implant, Source, Volume, file};
 use crate::jobs::{Job, Poll, Reporter, Step};
 use crate::load::{Limits, LoadError, Severity};
 use crate::presets;
+use crate::save::labels::{self, Saved};
 
 /// Something the user should read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -60,6 +61,8 @@ pub struct Session {
     waiting: Option<(PathBuf, Box<Case>)>,
     /// Grows whenever another case takes this one's place.
     replaced: u64,
+    /// Painted labels that are in files already.
+    saved_labels: Saved,
     wake: Wake,
 }
 
@@ -86,6 +89,7 @@ impl Session {
             problems: Vec::new(),
             waiting: None,
             replaced: 0,
+            saved_labels: Saved::new(),
             wake,
         }
     }
@@ -181,16 +185,21 @@ impl Session {
         self.queue.extend(paths.into_iter().map(|p| Work::Open(Source::path(&p))));
     }
 
-    /// Writes the case to `path`, which is its file from then on.
+    /// Writes the case to `path`, which is its file from then on, and painted labels into new files beside it.
     pub fn save(&mut self, path: &Path) -> bool {
-        match file::save(self.case(), path) {
+        let written = labels::beside(self.history.case(), &self.assets, path, &mut self.saved_labels);
+        let saved = match written {
+            Ok(case) => file::save(&case, path).map_err(|error| error.to_string()),
+            Err(error) => Err(error.to_string()),
+        };
+        match saved {
             Ok(()) => {
                 self.path = Some(path.to_owned());
                 self.history.mark_saved();
                 true
             }
-            Err(error) => {
-                self.complain(error.to_string());
+            Err(fault) => {
+                self.complain(fault);
                 false
             }
         }
@@ -213,6 +222,7 @@ impl Session {
     fn replace(&mut self, path: PathBuf, case: Case) {
         self.history = History::new(case);
         self.path = Some(path);
+        self.saved_labels.clear();
         self.failed.clear();
         self.replaced += 1;
     }

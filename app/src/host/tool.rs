@@ -7,7 +7,7 @@ use std::fmt;
 
 use super::context::ToolContext;
 use super::overlay::Overlay;
-use super::pointer::PointerEvent;
+use super::pointer::{PointerEvent, SectionEvent};
 
 /// A tool's stable name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -33,6 +33,14 @@ pub trait Tool {
     /// What the pointer does in the 3D view, before the view itself takes it. A tool that wants the drag
     /// that a press starts calls [`ToolContext::capture`].
     fn pointer(&mut self, _ctx: &mut ToolContext<'_>, _event: &PointerEvent) {}
+
+    /// What the pointer does in a section, before the crosshair follows it; as [`Tool::pointer`].
+    fn section_pointer(&mut self, _ctx: &mut ToolContext<'_>, _event: &SectionEvent) {}
+
+    /// The radius of the brush that the pointer is in a section, mm; none where it is no brush.
+    fn brush_mm(&self) -> Option<f64> {
+        None
+    }
 
     /// Lines and handles over the 3D view; world mm.
     fn draw(&self, _ctx: &ToolContext<'_>, _overlay: &mut Overlay) {}

@@ -3,16 +3,13 @@
 use std::collections::BTreeMap;
 
 use egui::Color32;
-use render::scene::Piece;
-use render::section::{Layer, Section, SectionError, Window};
+use nalgebra::{Rotation3, Unit};
+use render::section::{Layer, Section, SectionError, Slab, Window};
 use render::volume::{Grid, Point, Vector};
 
 use super::camera::Ball;
 use crate::case::{Assets, Case, Volume};
-use crate::scene;
-
-/// Values below this are air: only CT, in HU, stores such.
-pub const AIR_BELOW: f64 = -500.0;
+use crate::{scene, sections};
 
 /// A cross-section along the body's axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,13 +81,17 @@ pub enum ViewId {
     Section(Orientation),
 }
 
-/// Pan and zoom of one section; what is `None` fits the volumes.
+/// Pan, zoom, turn and thickness of one section; what is `None` fits the volumes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SectionState {
     /// World place in the middle of the picture; its part across the section is the crosshair's.
     pub centre: Option<Point>,
     /// Millimetres per point of the screen.
     pub mm_per_point: Option<f64>,
+    /// How it is turned from the body's planes.
+    pub turn: Rotation3<f64>,
+    /// How thick it is.
+    pub slab: Slab,
 }
 
 /// The state of all views.
@@ -102,8 +103,6 @@ pub struct Views {
     pub sections: [SectionState; 3],
     /// Window and level, by volume id.
     pub windows: BTreeMap<String, Window>,
-    /// How much of the second and later volumes shows over the first; 0 to 1.
-    pub fusion: f64,
     /// The one view that fills the window; none shows all four.
     pub only: Option<ViewId>,
 }
@@ -111,7 +110,7 @@ pub struct Views {
 impl Views {
     /// All views at their first state: everything fits.
     pub fn new() -> Self {
-        Self { fusion: 0.5, ..Self::default() }
+        Self::default()
     }
 
     /// Gives volumes that are new a window, and the crosshair a place.
@@ -119,7 +118,7 @@ impl Views {
         for volume in &case.volumes {
             let Some(grid) = assets.grid(volume) else { continue };
             if !self.windows.contains_key(&volume.id) {
-                self.windows.insert(volume.id.clone(), default_window(&grid));
+                self.windows.insert(volume.id.clone(), sections::default_window(&grid));
             }
             if self.crosshair.is_none() && volume.visible {
                 self.crosshair = Some(ball_of(volume, &grid).centre);
@@ -127,22 +126,35 @@ impl Views {
         }
     }
 
-    /// The visible volumes as the sections show them: the first grey, later ones tinted.
+    /// The visible volumes as the sections show them.
     pub fn layers(&self, case: &Case, assets: &Assets) -> Vec<Layer> {
-        const TINTS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, 0.72, 0.35], [0.45, 0.8, 1.0], [0.7, 1.0, 0.5]];
-        let shown = case.volumes.iter().filter(|v| v.visible);
-        shown
-            .filter_map(|volume| Some((volume, assets.grid(volume)?)))
-            .enumerate()
-            .map(|(index, (volume, grid))| Layer {
-                pose: volume.pose,
-                pieces: pieces_of(case, volume),
-                window: self.windows.get(&volume.id).copied().unwrap_or_else(|| default_window(&grid)),
-                grid,
-                color: TINTS[index.min(TINTS.len() - 1)],
-                share: self.fusion,
-            })
-            .collect()
+        sections::layers(case, assets, &self.windows)
+    }
+
+    /// Towards the right and the lower edge of a section as it is turned; LPS unit vectors.
+    pub fn axes(&self, orientation: Orientation) -> [Vector; 2] {
+        let turn = self.sections[orientation.index()].turn;
+        orientation.axes().map(|axis| turn * axis)
+    }
+
+    /// The direction across a section as it is turned that runs with the body's axis: to the left, the back or
+    /// the head.
+    pub fn normal(&self, orientation: Orientation) -> Vector {
+        let mut axis = Vector::zeros();
+        axis[orientation.normal_axis()] = 1.0;
+        self.sections[orientation.index()].turn * axis
+    }
+
+    /// Turns a section by an angle about an axis; radians, right-handed. An axis of no length turns nothing.
+    pub fn turn(&mut self, orientation: Orientation, axis: &Vector, angle_rad: f64) {
+        if let Some(axis) = Unit::try_new(*axis, 1e-12)
+            && angle_rad.is_finite()
+        {
+            let turn = &mut self.sections[orientation.index()].turn;
+            *turn = Rotation3::from_axis_angle(&axis, angle_rad) * *turn;
+            // Many small turns of a drag must not add up to something that is no rotation.
+            turn.renormalize();
+        }
     }
 
     /// The section of `orientation` through the crosshair, on a picture of `size_points` with
@@ -158,18 +170,20 @@ impl Views {
         pixels_per_point: f64,
     ) -> Result<Section, SectionError> {
         let state = &self.sections[orientation.index()];
-        let axis = orientation.normal_axis();
+        let normal = self.normal(orientation);
         let mut centre = state.centre.unwrap_or(ball.centre);
-        centre[axis] = self.crosshair.unwrap_or(ball.centre)[axis];
+        centre += normal * normal.dot(&(self.crosshair.unwrap_or(ball.centre) - centre));
         let mm_per_point = state.mm_per_point.unwrap_or_else(|| fit(ball, size_points));
-        let [right, down] = orientation.axes();
+        let [right, down] = self.axes(orientation);
         let size = size_points.map(|s| (s * pixels_per_point).round().max(1.0) as usize);
-        Section::new(centre, right, down, mm_per_point / pixels_per_point, size)
+        Section::new(centre, right, down, mm_per_point / pixels_per_point, size)?.with_slab(state.slab)
     }
 
-    /// Everything fits again.
+    /// Everything fits again; turns and thicknesses stay.
     pub fn fit(&mut self) {
-        self.sections = [SectionState::default(); 3];
+        for state in &mut self.sections {
+            (state.centre, state.mm_per_point) = (None, None);
+        }
     }
 }
 
@@ -177,14 +191,6 @@ impl Views {
 fn fit(ball: Ball, size_points: [f64; 2]) -> f64 {
     // A box's section is smaller than its ball's: 0.8 of it is what a body fills.
     0.8 * 2.0 * ball.radius_mm / size_points[0].min(size_points[1]).max(1.0)
-}
-
-/// The pieces of a volume that are drawn.
-pub fn pieces_of(case: &Case, volume: &Volume) -> Vec<Piece> {
-    if case.fragments_of(&volume.id).next().is_none() {
-        return vec![Piece::whole()];
-    }
-    case.fragments_of(&volume.id).filter(|f| f.visible).map(|f| case.piece(f)).collect()
 }
 
 /// The ball about a volume where it was acquired and placed, its fragments unmoved.
@@ -198,28 +204,10 @@ pub fn ball_of_case(case: &Case, assets: &Assets) -> Ball {
     Ball::about(scene::bounds(&scene.volumes, &scene.meshes).into_iter().flatten())
 }
 
-/// The window a volume gets before anybody has chosen: bone for CT (values below −500 are air), and
-/// otherwise from the 1st to the 99th percentile of about 30 000 samples.
-pub fn default_window(grid: &Grid) -> Window {
-    let [low, high] = grid.range();
-    if low < AIR_BELOW {
-        return Window { level: 350.0, width: 1800.0 };
-    }
-    let count = grid.samples().len();
-    let stride = (count / 30_000).max(1);
-    let mut seen: Vec<f64> = (0..count).step_by(stride).map(|i| grid.value_at(i)).collect();
-    seen.sort_by(f64::total_cmp);
-    let at = |part: f64| seen.get((part * (seen.len().max(1) - 1) as f64) as usize).copied();
-    let (low, high) = (at(0.01).unwrap_or(low), at(0.99).unwrap_or(high));
-    let width = if high > low { high - low } else { 1.0 };
-    Window { level: low + width / 2.0, width }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::host::camera::Facing;
-    use render::volume::{Affine, Rescale, Samples};
 
     #[test]
     fn sections_lie_as_radiology_reads_them() {
@@ -242,16 +230,21 @@ mod tests {
     }
 
     #[test]
-    fn the_first_window_is_bone_for_ct_and_the_bulk_of_the_values_otherwise() {
-        let grid = |v: Vec<f32>| {
-            Grid::new([v.len(), 1, 1], Samples::F32(v), Rescale::default(), Affine::identity()).expect("grid")
-        };
-        let ct = default_window(&grid(vec![-1000.0, 0.0, 900.0]));
-        assert_eq!((ct.level, ct.width), (350.0, 1800.0), "bone");
-        let mut values: Vec<f32> = (0..1000).map(|i| i as f32).collect();
-        values.push(1e6);
-        let mr = default_window(&grid(values));
-        assert!((mr.level - 500.0).abs() < 15.0 && (mr.width - 980.0).abs() < 15.0, "one hot voxel: {mr:?}");
-        assert_eq!(default_window(&grid(vec![5.0, 5.0])).width, 1.0, "a flat volume has a width");
+    fn a_turned_section_still_goes_through_the_crosshair_and_its_letters_turn_with_it() {
+        let crosshair = Point::new(3.0, -40.0, 25.0);
+        let mut views = Views { crosshair: Some(crosshair), ..Views::new() };
+        let ball = Ball { centre: Point::new(100.0, 50.0, 0.0), radius_mm: 120.0 };
+        for _ in 0..45 {
+            views.turn(Orientation::Axial, &Vector::x(), 1.0_f64.to_radians());
+        }
+        let section = views.section(Orientation::Axial, ball, [40.0, 30.0], 1.0).expect("section");
+        assert!(section.depth_mm(&crosshair).abs() < 1e-9, "through the crosshair");
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        assert!((section.down() - Vector::new(0.0, half, half)).norm() < 1e-12, "half a right angle");
+        assert_eq!(Facing::letters(&section.right()), "L", "what it was turned about stays");
+        assert_eq!(Facing::letters(&section.down()).len(), 2, "between two sides: both letters");
+        assert!((views.normal(Orientation::Axial) - section.forward()).norm() < 1e-12, "its normal");
+        views.sections[0].turn = Rotation3::identity();
+        assert_eq!(views.axes(Orientation::Axial), [Vector::x(), Vector::y()], "reset");
     }
 }

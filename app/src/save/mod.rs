@@ -4,6 +4,7 @@
 //! it goes under another name; so a file is whole or not there.
 
 pub mod choice;
+pub mod labels;
 pub mod nrrd;
 pub mod picture;
 pub mod series;

@@ -8,7 +8,9 @@ use crate::host::registry::{Registry, RegistryError};
 pub mod cutting;
 pub mod fragments;
 pub mod implants;
+pub mod labels;
 pub mod player;
+pub mod sections;
 pub mod transfer;
 pub mod volumes;
 
@@ -25,6 +27,8 @@ pub fn register_all(registry: &mut Registry) -> Result<(), RegistryError> {
     registry.add::<cutting::Cutting>()?;
     registry.add::<fragments::Fragments>()?;
     registry.add::<implants::Implants>()?;
+    registry.add::<labels::LabelsTool>()?;
+    registry.add::<sections::Sections>()?;
     registry.add::<player::Player>()?;
     Ok(())
 }

@@ -10,12 +10,14 @@ use render::volume::{
 
 use super::register_all;
 use crate::case::assets::{Asset, Data, Key};
-use crate::case::{Assets, Case, Edit, Fragment, Implant, NamedCutter, Source, Volume};
+use crate::case::labels::LabelChange;
+use crate::case::{Assets, Case, Edit, Fragment, Implant, LabelSet, NamedCutter, Source, Volume, edit};
 use crate::host::context::{Request, Selection, ToolContext};
 use crate::host::overlay::Overlay;
+use crate::host::pointer::{Phase, SectionEvent};
 use crate::host::registry::Registry;
 use crate::host::tool::ToolId;
-use crate::host::views::Views;
+use crate::host::views::{Orientation, Views};
 use crate::steps::Steps;
 
 /// What a tool is drawn in.
@@ -57,6 +59,7 @@ fn bench() -> Bench {
         implants: vec![implant],
         cutters: vec![NamedCutter::new("cut", plane), NamedCutter::new("drill", tube)],
         fragments: vec![piece("left part", Side::Plus), piece("right part", Side::Minus)],
+        labels: vec![LabelSet::new("necrosis", "ct", None)],
         ..Case::default()
     };
     let mut bench = Bench { case, assets, views: Views::new(), ..Bench::default() };
@@ -87,7 +90,7 @@ fn ids() -> Vec<ToolId> {
 
 #[test]
 fn every_registered_panel_draws_with_and_without_a_case() {
-    assert!(ids().len() >= 6, "volumes, transfer, cutting, fragments, implants, player");
+    assert!(ids().len() >= 8, "volumes, transfer, cutting, fragments, implants, labels, sections, player");
     for id in ids() {
         let mut full = panel(bench(), id);
         full.run();
@@ -209,4 +212,39 @@ fn the_player_has_nothing_to_play_of_a_still_volume() {
     let mut player = panel(bench(), ToolId("player"));
     player.run();
     player.get_by_label_contains("No volume over time");
+}
+
+#[test]
+fn a_stroke_of_the_brush_is_edits_that_paint() {
+    let mut panel = panel(bench(), ToolId("labels"));
+    panel.run();
+    panel.get_by_label("Paint in the sections").click();
+    panel.run();
+    let Bench { case, assets, selection, views, edits, requests, registry, .. } = panel.state_mut();
+    let mut context = ToolContext::new(case, assets, selection, views, edits, requests);
+    let tool = registry.tool_mut(ToolId("labels")).expect("the tool");
+    assert_eq!(tool.brush_mm(), Some(5.0), "a brush");
+    for (phase, x) in [(Phase::Press, 1.0), (Phase::Drag, 2.0), (Phase::Release, 2.0)] {
+        tool.section_pointer(&mut context, &SectionEvent { phase, place: Point::new(x, 3.0, 3.0) });
+    }
+    assert!(context.is_captured(), "the crosshair stays where it is");
+    let mut case = panel.state().case.clone();
+    for step in panel.state().edits.clone() {
+        assert!(matches!(&step, Edit::ChangeLabels { change: LabelChange::Paint(_), .. }), "{step:?}");
+        edit::apply(&mut case, step).expect("painted");
+    }
+    let labels = panel.state().assets.labels(&case, &case.labels[0]).expect("labels");
+    assert_eq!(labels.grid.value(1, 3, 3), 1.0, "under the brush");
+    assert_eq!(labels.grid.value(4, 3, 3), 0.0, "the other piece is left alone");
+}
+
+#[test]
+fn a_section_is_turned_by_its_angles_and_reset() {
+    let mut bench = bench();
+    bench.views.turn(Orientation::Coronal, &Vector::x(), 0.3);
+    let mut panel = panel(bench, ToolId("sections"));
+    panel.run();
+    panel.get_by_label("Back to coronal").click();
+    panel.run();
+    assert_eq!(panel.state().views.axes(Orientation::Coronal), Orientation::Coronal.axes(), "as it was");
 }

@@ -6,6 +6,12 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GpuError {
+    /// Only the processor draws this.
+    #[error("{what} is not drawn by the GPU: draw it by the processor (--backend cpu)")]
+    CpuOnly {
+        /// What it is.
+        what: &'static str,
+    },
     /// No adapter answers.
     #[error(
         "no usable GPU was found ({reason}); install a Vulkan driver (on Debian: mesa-vulkan-drivers, \

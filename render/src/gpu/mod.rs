@@ -3,6 +3,7 @@
 mod error;
 mod readback;
 
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 pub use error::GpuError;
@@ -44,8 +45,7 @@ pub struct Caps {
     pub storage_bytes: u64,
     /// Whether the CPU does the work.
     pub software: bool,
-    /// Bytes that the texture of one volume may take where its format is left to the renderer. No interface tells
-    /// how much memory there is: it is what a small graphics card can spare.
+    /// Bytes that the texture of one volume may take where its format is left to the renderer.
     pub texture_budget: u64,
 }
 
@@ -56,6 +56,8 @@ pub struct Gpu {
     pub(crate) queue: wgpu::Queue,
     adapter: String,
     caps: Caps,
+    /// Calls until the device is given up, for tests; 0: never.
+    lost_after: AtomicU32,
     /// The last fault that no call returned: set by the device's callbacks.
     fault: Arc<Mutex<Option<GpuError>>>,
 }
@@ -99,7 +101,7 @@ impl Gpu {
             texture_2d: limits.max_texture_dimension_2d,
             storage_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
             software: info.device_type == wgpu::DeviceType::Cpu,
-            texture_budget: 1 << 30,
+            texture_budget: u64::MAX,
         };
         let fault = Arc::new(Mutex::new(None));
         let seen = Arc::clone(&fault);
@@ -114,10 +116,11 @@ impl Gpu {
         let seen = Arc::clone(&fault);
         device.set_device_lost_callback(move |_, reason| {
             let lost = GpuError::Lost { reason };
-            seen.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(lost);
+            // Whatever else was reported is an echo of this.
+            *seen.lock().unwrap_or_else(PoisonError::into_inner) = Some(lost);
         });
         let adapter = format!("{} ({:?})", info.name, info.backend);
-        Self { device, queue, adapter, caps, fault }
+        Self { device, queue, adapter, caps, lost_after: AtomicU32::new(0), fault }
     }
 
     /// Name and interface of the adapter: `"llvmpipe (LLVM 15.0.6, 256 bits) (Vulkan)"`.
@@ -130,12 +133,42 @@ impl Gpu {
         self.caps
     }
 
+    /// Gives the device up, as a driver does that is reset, before the `call`th call from now, counted from 1: what a
+    /// program does then can be tried at every place. Returns the calls that were left of an earlier order, 0 where
+    /// it was carried out.
+    pub fn lose_after(&self, call: u32) -> u32 {
+        self.lost_after.swap(call, Ordering::Relaxed)
+    }
+
+    /// A call is about to be made that a lost device answers with a fault.
+    pub(crate) fn count_call(&self) {
+        let left = self.lost_after.load(Ordering::Relaxed);
+        if left > 0 {
+            self.lost_after.store(left - 1, Ordering::Relaxed);
+            if left == 1 {
+                self.device.destroy();
+            }
+        }
+    }
+
+    /// Submits recorded work.
+    pub(crate) fn submit(&self, encoder: Option<wgpu::CommandEncoder>) {
+        self.count_call();
+        self.queue.submit(encoder.map(wgpu::CommandEncoder::finish));
+    }
+
     /// Takes the fault that the device reported since the last call, if any.
     ///
     /// # Errors
     /// That fault.
     pub(crate) fn check(&self) -> Result<(), GpuError> {
-        self.fault.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+        let take = || self.fault.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let Some(fault) = take() else { return Ok(()) };
+        // What a lost device is asked for is refused before the loss is told: ask whether there is one to tell.
+        match self.device.poll(wgpu::PollType::Poll) {
+            Ok(_) => Err(take().filter(|later| matches!(later, GpuError::Lost { .. })).unwrap_or(fault)),
+            Err(error) => Err(GpuError::Lost { reason: error.to_string() }),
+        }
     }
 
     /// Waits until all that was submitted is done.

@@ -15,7 +15,7 @@ pub(crate) fn read_buffer(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: u64) -> Resul
     });
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, bytes);
-    gpu.queue.submit([encoder.finish()]);
+    gpu.submit(Some(encoder));
     map(gpu, &staging)
 }
 
@@ -46,7 +46,7 @@ pub(crate) fn read_texture(gpu: &Gpu, texture: &wgpu::Texture, texel: u32) -> Re
         },
         texture.size(),
     );
-    gpu.queue.submit([encoder.finish()]);
+    gpu.submit(Some(encoder));
     let mut bytes = map(gpu, &staging)?;
     let (row, padded) = (row as usize, padded as usize);
     for y in 0..height as usize {

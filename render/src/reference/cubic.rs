@@ -54,6 +54,15 @@ impl Cubic {
         }
     }
 
+    /// Its greatest value on `[0, to]`, and where.
+    pub(super) fn most(&self, to: f64) -> (f64, f64) {
+        let places = self.turns(to).into_iter().chain([to]);
+        places.fold((self.at(0.0), 0.0), |best, u| {
+            let value = self.at(u);
+            if value > best.0 { (value, u) } else { best }
+        })
+    }
+
     /// Where the slope changes sign inside `(0, to)`, rising; `to` stands for "no such place".
     fn turns(&self, to: f64) -> [f64; 2] {
         let [_, c1, c2, c3] = self.0;
@@ -107,6 +116,8 @@ mod tests {
         for (found, known) in roots.iter().zip([0.2, 0.5, 0.9]) {
             assert!((found - known).abs() < 1e-14, "{found} is not {known}");
         }
+        let (most, at) = cubic.most(0.7);
+        assert!((most - cubic.at(at)).abs() < 1e-15 && cubic.slope(at).abs() < 1e-12, "its hill, at {at}");
         let [low, high] = cubic.bounds(0.0, 1.0);
         for i in 0..=100 {
             let v = cubic.at(f64::from(i) / 100.0);

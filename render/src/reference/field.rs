@@ -171,6 +171,8 @@ mod tests {
             shading: Shading::Lit,
             texture: TextureFormat::Auto,
             pieces: vec![Piece::whole()],
+            labels: None,
+            mode: Default::default(),
         }
     }
 

@@ -3,16 +3,18 @@
 use super::field::Field;
 use super::integrate::{DARK, Gathered};
 use super::intervals::Intervals;
+use super::modes::Layered;
 use super::surface::{Hit, Surfaces};
 use super::walk::{Part, Walker};
 use super::{Options, ReferenceError};
-use crate::scene::{CameraFrame, Projection, Scene};
+use crate::scene::{CameraFrame, Projection, Scene, VolumeMode};
 use crate::volume::Vector;
 
 /// The volumes of a scene, ready for rays; none for those without pieces.
 pub(super) fn fields<'a>(scene: &'a Scene, options: Options) -> Vec<Option<Field<'a>>> {
     let field = |item: &'a crate::scene::VolumeItem| {
-        (!item.pieces.is_empty()).then(|| Field::of(item, options.skip_empty))
+        let skip_empty = options.skip_empty && item.mode == VolumeMode::Composite;
+        (!item.pieces.is_empty()).then(|| Field::of(item, skip_empty))
     };
     scene.volumes.iter().map(field).collect()
 }
@@ -37,6 +39,7 @@ pub(super) struct Scratch {
 #[derive(Debug)]
 pub(super) struct Tracer<'a> {
     parts: Vec<Part<'a>>,
+    layered: Vec<Layered<'a>>,
     surfaces: Surfaces,
     frame: CameraFrame,
     projection: Projection,
@@ -48,22 +51,26 @@ pub(super) struct Tracer<'a> {
 impl<'a> Tracer<'a> {
     /// `fields` are those of the scene.
     pub(super) fn new(
-        scene: &Scene,
+        scene: &'a Scene,
         fields: &'a [Option<Field<'a>>],
         size: [u32; 2],
         options: Options,
     ) -> Result<Self, ReferenceError> {
         let frame = scene.camera.frame()?;
         let eye = &scene.camera.eye;
-        let mut parts = Vec::new();
+        let (mut parts, mut layered) = (Vec::new(), Vec::new());
         for (item, field) in scene.volumes.iter().zip(fields) {
-            if let Some(field) = field {
+            if let Some(field) = field
+                && item.mode != VolumeMode::Composite
+            {
+                layered.push(Layered::of(field, item, eye));
+            } else if let Some(field) = field {
                 parts.extend(item.pieces.iter().map(|piece| Part::new(field, item, piece, eye)));
             }
         }
         let surfaces = Surfaces::of(&scene.meshes, eye);
         let projection = scene.camera.projection;
-        Ok(Self { parts, surfaces, frame, projection, size, cuts: options.parts.max(1) })
+        Ok(Self { parts, layered, surfaces, frame, projection, size, cuts: options.parts.max(1) })
     }
 
     /// The ray of a pixel: its start relative to the eye, and its direction.
@@ -85,6 +92,13 @@ impl<'a> Tracer<'a> {
     pub(super) fn pixel(&self, x: u32, y: u32, scratch: &mut Scratch) -> [f64; 4] {
         let (offset, direction) = self.ray(x, y);
         self.surfaces.hits(&offset, &direction, &mut scratch.hits);
+        if !self.layered.is_empty() {
+            for volume in &self.layered {
+                volume.hits(&offset, &direction, &mut scratch.intervals, &mut scratch.hits);
+            }
+            // Stable: at one distance surfaces come first, then volumes in their order.
+            scratch.hits.sort_by(|a, b| a.at.total_cmp(&b.at));
+        }
         scratch.edges.clear();
         for (part, piece) in self.parts.iter().enumerate() {
             let line = piece.line(&offset, &direction);
@@ -115,8 +129,7 @@ impl<'a> Tracer<'a> {
             } else if let Some(edge) = edges.next() {
                 let part = &self.parts[edge.part];
                 if edge.begins {
-                    let line = part.line(&offset, &direction);
-                    walkers.push(Walker::start(part, line, direction, edge.at));
+                    walkers.push(Walker::start(part, &offset, direction, edge.at));
                 } else {
                     walkers.retain(|walker| !walker.is_in(part));
                 }

@@ -29,6 +29,13 @@ pub(super) struct Hit {
     triangle: usize,
 }
 
+impl Hit {
+    /// A layer that is no triangle: of a volume that is drawn as one.
+    pub(super) fn layer(at: f64, color: [f64; 3], opacity: f64) -> Self {
+        Self { at, color, opacity, triangle: usize::MAX }
+    }
+}
+
 #[derive(Debug)]
 struct Triangle {
     corners: [Vector; 3],

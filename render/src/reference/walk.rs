@@ -6,6 +6,7 @@ use nalgebra::Matrix3;
 use super::cubic::Cubic;
 use super::field::{Field, along};
 use super::intervals::{Cut, Intervals};
+use super::labels::{self, Painting};
 use super::light;
 use super::slope::Slope;
 use crate::scene::{Piece, VolumeItem};
@@ -14,10 +15,11 @@ use crate::volume::{Point, Vector};
 /// A piece of a volume, ready for rays.
 #[derive(Debug)]
 pub(super) struct Part<'a> {
-    field: &'a Field<'a>,
+    pub(super) field: &'a Field<'a>,
+    pub(super) painting: Option<Painting<'a>>,
     voxel_from_world: Matrix3<f64>,
     /// Takes a gradient per voxel to one per mm of world.
-    gradient_to_world: Matrix3<f64>,
+    pub(super) gradient_to_world: Matrix3<f64>,
     /// The centre of the first voxel, relative to the eye; mm.
     first_voxel: Vector,
     cuts: Vec<Cut>,
@@ -25,12 +27,13 @@ pub(super) struct Part<'a> {
 
 impl<'a> Part<'a> {
     /// A piece as it lies in the world, seen from `eye`.
-    pub(super) fn new(field: &'a Field<'a>, item: &VolumeItem, piece: &Piece, eye: &Point) -> Self {
+    pub(super) fn new(field: &'a Field<'a>, item: &'a VolumeItem, piece: &Piece, eye: &Point) -> Self {
         let world_from_voxel = piece.pose * item.pose * *item.grid.world_from_voxel();
         let voxel_from_world = world_from_voxel.inverse().linear();
         let cuts = piece.keep.iter().map(|(cutter, side)| Cut::new(cutter, *side, &piece.pose, eye));
         Self {
             field,
+            painting: item.labels.as_ref().map(|labels| Painting::of(labels, piece, eye)),
             voxel_from_world,
             gradient_to_world: voxel_from_world.transpose(),
             first_voxel: world_from_voxel.point(&Point::origin()) - eye,
@@ -73,17 +76,17 @@ impl<'a> Part<'a> {
 /// A ray in voxel space: `origin + t·step`, t in mm of world.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
-    origin: [f64; 3],
-    step: [f64; 3],
+    pub(super) origin: [f64; 3],
+    pub(super) step: [f64; 3],
 }
 
 impl Line {
-    fn at(&self, axis: usize, t: f64) -> f64 {
+    pub(super) fn at(&self, axis: usize, t: f64) -> f64 {
         self.origin[axis] + self.step[axis] * t
     }
 
     /// When the coordinate of an axis is `place`; never, if it does not change.
-    fn reaches(&self, axis: usize, place: f64) -> f64 {
+    pub(super) fn reaches(&self, axis: usize, place: f64) -> f64 {
         if self.step[axis] == 0.0 { f64::INFINITY } else { (place - self.origin[axis]) / self.step[axis] }
     }
 }
@@ -93,6 +96,8 @@ impl Line {
 pub(super) struct Walker<'a> {
     part: &'a Part<'a>,
     line: Line,
+    /// The ray in the voxel space of the labels.
+    label_line: Option<Line>,
     direction: Vector,
     cell: [i64; 3],
     /// The last cell of each axis that is left at once: the cell itself, or the far side of a clear brick.
@@ -112,16 +117,20 @@ pub(super) struct Walker<'a> {
     pub(super) clear: bool,
     class: usize,
     lit: bool,
+    /// The colour of the label that all of the span lies in.
+    paint: Option<[f64; 4]>,
 }
 
 impl<'a> Walker<'a> {
-    /// At `t` on a ray that lies inside the piece's grid there.
-    pub(super) fn start(part: &'a Part<'a>, line: Line, direction: Vector, t: f64) -> Self {
+    /// At `t` on a ray that lies inside the piece's grid there. `offset` is the ray's start relative to the eye.
+    pub(super) fn start(part: &'a Part<'a>, offset: &Vector, direction: Vector, t: f64) -> Self {
+        let line = part.line(offset, &direction);
         let cell =
             std::array::from_fn(|a| (line.at(a, t).floor() as i64).clamp(-1, part.field.extent[a] - 1));
         let mut walker = Self {
             part,
             line,
+            label_line: part.painting.as_ref().map(|p| p.line(offset, &direction)),
             direction,
             cell,
             last: cell,
@@ -136,6 +145,7 @@ impl<'a> Walker<'a> {
             clear: true,
             class: 0,
             lit: false,
+            paint: None,
         };
         walker.enter();
         walker
@@ -219,6 +229,9 @@ impl<'a> Walker<'a> {
             self.slope = Slope::new(&per_voxel, &self.part.gradient_to_world, &self.direction);
             self.slope.breaks(length, field.classes.flat_per_mm, &mut self.breaks);
         }
+        if let (Some(painting), Some(line)) = (&self.part.painting, &self.label_line) {
+            painting.walls(line, [self.entry, self.exit], &mut self.breaks);
+        }
         self.breaks.sort_unstable_by(f64::total_cmp);
         for at in &mut self.breaks {
             *at += self.entry;
@@ -238,23 +251,33 @@ impl<'a> Walker<'a> {
         self.class = field.classes.find(self.value.at(middle));
         self.clear = field.classes.is_clear(self.class);
         self.lit = field.lit && !self.clear && self.slope.lights(middle, field.classes.flat_per_mm);
+        self.paint = match (&self.part.painting, &self.label_line) {
+            (Some(painting), Some(line)) if !self.clear => painting.color_at(line, middle + self.entry),
+            _ => None,
+        };
     }
 
     /// Colour and extinction (1/mm) at `t` in the current span.
     pub(super) fn classify(&self, t: f64) -> ([f64; 3], f64) {
         let u = t - self.entry;
-        let (color, tau) = self.part.field.classes.classify(self.class, self.value.at(u));
+        let (color, tau) = self.painted(u);
         if self.lit { (light::lit(color, self.slope.facing(u)), tau) } else { (color, tau) }
+    }
+
+    /// Colour with its label, unlit, and extinction (1/mm) at `u` mm after `entry`.
+    fn painted(&self, u: f64) -> ([f64; 3], f64) {
+        let (color, tau) = self.part.field.classes.classify(self.class, self.value.at(u));
+        (labels::painted(color, self.paint), tau)
     }
 
     /// Whether the gradient hardly turns between two places, and no channel starts or ends being held
     /// within the display's range.
     fn light_is_smooth(&self, a: f64, b: f64) -> bool {
         let classes = &self.part.field.classes;
-        let held =
-            |u: f64| light::held(classes.classify(self.class, self.value.at(u)).0, self.slope.facing(u));
+        let held = |u: f64| light::held(self.painted(u).0, self.slope.facing(u));
+        let glares = classes.glares(self.class) || self.paint.is_some();
         self.slope.is_steady(a, b)
-            && (!classes.glares(self.class) || {
+            && (!glares || {
                 let middle = held(0.5 * (a + b));
                 held(a) == middle && held(b) == middle
             })

@@ -176,6 +176,7 @@ fn write_part(
     size: wgpu::Extent3d,
     bytes: &[u8],
 ) {
+    gpu.count_call();
     let format = texture.format();
     let block = u32::from(format.is_compressed()) * 3 + 1;
     gpu.queue.write_texture(
@@ -270,6 +271,12 @@ impl TextureCache {
     /// What decodes the steps from now on.
     pub(crate) fn set_decoder(&mut self, decoder: StepDecoder) {
         self.packed.set_decoder(decoder);
+    }
+
+    /// Lets go of everything.
+    pub(crate) fn clear(&mut self) {
+        self.kept.clear();
+        self.packed.forget_unused();
     }
 
     /// Lets go of what nobody but the cache holds.

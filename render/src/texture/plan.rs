@@ -68,8 +68,22 @@ impl Plan {
                 caps.texture_budget >> 20
             ));
         }
-        let reduce = [0, 1, 2].map(|a| (high[a] - low[a] + 1).div_ceil(caps.texture_3d as usize & !3));
-        if reduce != [1; 3] {
+        let reduce = [0, 1, 2].map(|a| texels[a].div_ceil(caps.texture_3d as usize & !3));
+        // Where even half a byte a voxel is too much, every axis is halved, or more.
+        let fits = |by: usize| {
+            let voxels: u64 = texels.iter().map(|&n| n.div_ceil(by) as u64).product();
+            voxels / 2 <= caps.texture_budget
+        };
+        let by = (1..=64).find(|&by| fits(by)).unwrap_or(64);
+        if asked == TextureFormat::Auto && by > 1 {
+            let [x, y, z] = extent;
+            let budget = caps.texture_budget >> 20;
+            notes.push(format!(
+                "a volume of {x} x {y} x {z} is drawn at 1/{by} of its resolution: it may take {budget} MiB"
+            ));
+        }
+        let reduce = if asked == TextureFormat::Auto { reduce.map(|r| r.max(by)) } else { reduce };
+        if reduce.iter().any(|&r| r > by) {
             notes.push(format!(
                 "a volume of {} x {} x {} is drawn at 1/{} of its resolution: this GPU's 3D textures end at {}",
                 extent[0],

@@ -131,7 +131,7 @@ impl Decoder {
                 },
             );
         }
-        gpu.queue.submit([encoder.finish()]);
+        gpu.submit(Some(encoder));
     }
 }
 
@@ -240,7 +240,7 @@ pub fn decode_on_device(gpu: &Gpu, step: &PackedStep) -> Result<Vec<u8>, GpuErro
         },
         texture.size(),
     );
-    gpu.queue.submit([encoder.finish()]);
+    gpu.submit(Some(encoder));
     let bytes = read_buffer(gpu, &buffer, buffer.size())?;
     Ok(bytes.chunks(pitch as usize).flat_map(|row| &row[..sizes[0] as usize]).copied().collect())
 }

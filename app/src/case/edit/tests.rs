@@ -202,3 +202,47 @@ fn only_changes_of_one_property_of_one_thing_are_one_drag() {
     let remove = Edit::RemoveCutter { id: "a".to_owned() };
     assert!(!remove.continues(&remove.clone()), "removing is a step of its own");
 }
+
+#[test]
+fn labels_follow_their_volume_and_go_with_it() {
+    let mut case = planned();
+    apply(&mut case, Edit::AddVolume(volume("seg"))).expect("another volume");
+    apply(&mut case, Edit::MakeLabels { id: "seg".to_owned(), volume: "ct".to_owned() }).expect("labels");
+    assert_eq!((case.volumes.len(), case.labels.len()), (1, 1), "the volume has become a label set");
+    assert_eq!(case.labels[0].source.as_ref(), Some(&case.volumes[0].source), "of the same data");
+    let own = apply(&mut case, Edit::MakeLabels { id: "ct".to_owned(), volume: "ct".to_owned() });
+    assert!(matches!(own, Err(EditError::OwnLabels { .. })), "{own:?}");
+    apply(&mut case, Edit::RenameVolume { id: "ct".to_owned(), to: "hip".to_owned() }).expect("renamed");
+    assert_eq!(case.labels[0].volume, "hip", "they follow");
+    let change = |change| Edit::ChangeLabels { id: "seg".to_owned(), change };
+    let color = [0.1, 0.2, 0.3, 0.4];
+    apply(&mut case, change(LabelChange::Color { label: 3, color })).expect("a colour");
+    assert_eq!(case.labels[0].color(3), color, "chosen");
+    assert_eq!(case.labels[0].color(4), render::volume::default_color(4), "not chosen");
+    let wrong = apply(&mut case, change(LabelChange::Color { label: 3, color: [0.0, 0.0, 1.5, 0.0] }));
+    assert!(matches!(wrong, Err(EditError::Range { .. })), "{wrong:?}");
+    let paint = || change(LabelChange::Paint(labels::Bricks::new()));
+    let tint = |label| change(LabelChange::Color { label, color });
+    assert!(paint().continues(&paint()) && tint(1).continues(&tint(1)), "one drag, one step");
+    assert!(!tint(1).continues(&tint(2)) && !paint().continues(&tint(1)), "different things");
+    apply(&mut case, Edit::RemoveVolume { id: "hip".to_owned() }).expect("removed");
+    assert!(case.labels.is_empty(), "they go with it");
+}
+
+#[test]
+fn a_blend_and_a_mode_are_checked() {
+    let mut case = planned();
+    let blend = |blend| Edit::SetBlend { id: "ct".to_owned(), blend };
+    apply(&mut case, blend(0.25)).expect("a blend");
+    assert!(matches!(apply(&mut case, blend(f64::NAN)), Err(EditError::Range { .. })), "not a number");
+    let iso = |value, opacity| {
+        let mode = VolumeMode::Isosurface { value, opacity };
+        Edit::SetVolumeMode { id: "ct".to_owned(), mode }
+    };
+    apply(&mut case, iso(300.0, 0.5)).expect("a mode");
+    for (value, opacity) in [(f64::INFINITY, 1.0), (0.0, -0.1)] {
+        assert!(matches!(apply(&mut case, iso(value, opacity)), Err(EditError::Range { .. })), "{value}");
+    }
+    let kept = (case.volumes[0].blend, case.volumes[0].mode);
+    assert_eq!(kept, (0.25, VolumeMode::Isosurface { value: 300.0, opacity: 0.5 }), "the last good ones");
+}

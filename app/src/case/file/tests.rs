@@ -7,7 +7,7 @@ use crate::case::{Edit, edit};
 const FULL: &str = r#"{
   "osteotome": 1, "later": {"deep": [1, {"x": null}]}, "name": "left hip",
   "volumes": [{"id": "ct", "source": "ct/", "item": 2, "step": 5, "texture": "bc3", "shading": "gradient",
-    "window": [40, 400], "visible": false,
+    "window": [40, 400], "visible": false, "mode": {"isosurface": {"value": 250.5, "opacity": 0.75}}, "blend": 0.25,
     "pose": [0,-1,0,5, 1,0,0,-7.25, 0,0,1,0.1, 0,0,0,1],
     "transfer": {"points": [[-1024,0,0,0,0],[300,0.85,0.6,0.4,0.25]], "unit_mm": 2.5, "preset": "mine"}}],
   "cutters": [{"id": "c1", "plane": {"point": [1,2,3], "normal": [0,0,2], "extent": 40}, "note": "a"},
@@ -15,6 +15,9 @@ const FULL: &str = r#"{
   "fragments": [{"id": "head", "volume": "ct", "keep": {"c2": "-", "c1": "+"}, "goal": "medial"}],
   "implants": [{"id": "stem", "source": "builtin:hip/stem", "scale": 1000, "color": [1,0,0.5], "opacity": 0.5,
                 "lot": 7}],
+  "labels": [{"id": "lungs", "volume": "ct", "source": "ct/lungs.nrrd", "item": 1,
+              "colors": {"1": [1.0, 0.0, 0.5, 0.5], "40": [0.0, 1.0, 0.0, 1.0]}, "visible": false, "by": "ann"},
+             {"id": "mine", "volume": "ct", "colors": {}, "visible": true}],
   "camera": {"eye": [0,-500,0], "target": [0,0,0], "up": [0,0,1], "parallel_mm": 300, "lens": "x"},
   "background": [0, 0.5, 1]
 }"#;
@@ -46,6 +49,14 @@ fn a_round_trip_keeps_everything_unknown_keys_too() {
         "/volumes/0/texture",
         "/volumes/0/shading",
         "/volumes/0/visible",
+        "/volumes/0/mode",
+        "/volumes/0/blend",
+        "/labels/0/source",
+        "/labels/0/item",
+        "/labels/0/colors",
+        "/labels/0/visible",
+        "/labels/0/by",
+        "/labels/1",
         "/cutters/0/note",
         "/cutters/0/plane/extent",
         "/fragments/0/goal",
@@ -86,6 +97,8 @@ fn what_is_optional_has_its_default() {
     assert_eq!(case.implants[0].shading, render::scene::Shading::Lit, "implants are lit");
     assert_eq!((case.implants[0].scale, case.camera, case.background), (1.0, None, [0.0; 3]), "the rest");
     assert_eq!(volume.transfer.unit_mm(), 1.0, "opacity of one millimetre");
+    let mode = render::scene::VolumeMode::Composite;
+    assert_eq!((volume.mode, volume.blend, case.labels.len()), (mode, 1.0, 0), "composited, weighing one");
 }
 
 /// A change to [`FULL`] and the field that the complaint must name.
@@ -132,6 +145,16 @@ fn every_broken_field_is_named_with_its_fault() {
         ("/volumes/0/transfer/points/1", "[300,2,0,0,0]", "volumes[0].transfer.points[1]", "0 to 1"),
         ("/volumes/0/transfer/points/1", "[300,0,0,0]", "volumes[0].transfer.points[1]", "not 5"),
         ("/volumes/0/transfer/unit_mm", "0", "volumes[0].transfer.unit_mm", "positive"),
+        ("/volumes/0/blend", "1.5", "volumes[0].blend", "between 0 and 1"),
+        ("/volumes/0/mode", "\"xray\"", "volumes[0].mode", "not a mode"),
+        ("/volumes/0/mode", "{\"isosurface\": 3}", "volumes[0].mode.isosurface", "not an object"),
+        ("/volumes/0/mode/isosurface/value", "null", "volumes[0].mode.isosurface.value", "missing"),
+        ("/volumes/0/mode/isosurface/opacity", "2", "volumes[0].mode.isosurface.opacity", "between 0 and 1"),
+        ("/labels/0/volume", "\"mri\"", "labels[0].volume", "\"mri\""),
+        ("/labels/1/id", "\"lungs\"", "labels[1].id", "twice"),
+        ("/labels/0/colors/0", "[0,0,0,1]", "labels[0].colors.0", "not a label"),
+        ("/labels/0/colors/1", "[0,0,2,1]", "labels[0].colors.1", "outside 0 to 1"),
+        ("/labels/0/colors/1", "[0,0,0]", "labels[0].colors.1", "3 numbers, not 4"),
         ("/cutters/0/plane", "null", "cutters[0]", "neither"),
         ("/cutters/1/plane", "{}", "cutters[1]", "both"),
         ("/cutters/0/plane/normal", "[0,0,0]", "cutters[0].plane", "no length"),

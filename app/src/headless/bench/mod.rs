@@ -1,5 +1,5 @@
 //! `bench`: run time beside error. One file a benchmark: `frame` draws, `textures` makes textures, `accuracy` refines
-//! scenes of known pictures, `pareto` sweeps what a picture can be made cheaper by; `series` and `play`, of volumes over
+//! scenes of known pictures, `pareto` sweeps what a picture can be made cheaper by, `skips` says what skipping saves; `series` and `play`, of volumes over
 //! time, lie beside what they measure.
 //!
 //! Each result is one JSON object a line (`--json`) or a line of a table. Times are the median of
@@ -11,6 +11,7 @@ mod frame;
 mod painter;
 mod pareto;
 mod peer;
+mod skips;
 mod textures;
 
 use std::path::Path;
@@ -57,6 +58,10 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
         BenchName::Accuracy => {
             accuracy::run(&mut bench)?;
             accuracy::charts(&bench.rows)
+        }
+        BenchName::Skips => {
+            skips::run(&data(args)?, &mut bench)?;
+            Vec::new()
         }
         BenchName::Pareto => {
             let case = args.data.as_deref().filter(|path| input::is_case(path));

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use ::render::cpu::CpuRenderer;
 use ::render::gpu::Gpu;
 use ::render::image::FloatImage;
 use ::render::reference;
@@ -42,8 +43,11 @@ pub(super) trait Painter {
 pub(super) type Maker = fn(&Arc<Gpu>) -> Result<Box<dyn Painter>, Failure>;
 
 /// All there are.
-pub(super) const MAKERS: [Maker; 2] =
-    [|gpu| Ok(Box::new(OnGpu(Renderer::new(Arc::clone(gpu))?))), |_| Ok(Box::new(Exact))];
+pub(super) const MAKERS: [Maker; 3] = [
+    |gpu| Ok(Box::new(OnGpu(Renderer::new(Arc::clone(gpu))?))),
+    |_| Ok(Box::new(OnCpu(CpuRenderer::new()))),
+    |_| Ok(Box::new(Exact)),
+];
 
 /// The wgpu renderer.
 struct OnGpu(Renderer);
@@ -61,6 +65,20 @@ impl Painter for OnGpu {
     fn paint(&mut self, scene: &Scene, size: [u32; 2], spacing: f64) -> Result<Painted, Failure> {
         let stats = self.0.render(scene, size, Quality::Spacing(spacing))?;
         Ok(Painted { picture: self.0.read()?, frame_ms: stats.frame_ms })
+    }
+}
+
+/// The processor alone.
+struct OnCpu(CpuRenderer);
+
+impl Painter for OnCpu {
+    fn name(&self) -> &'static str {
+        "cpu"
+    }
+
+    fn paint(&mut self, scene: &Scene, size: [u32; 2], spacing: f64) -> Result<Painted, Failure> {
+        let (picture, stats) = self.0.render(scene, size, Quality::Spacing(spacing), &|_, _| true)?;
+        Ok(Painted { picture, frame_ms: stats.frame_ms })
     }
 }
 

@@ -29,9 +29,6 @@ pub(super) fn show_ui(pose: &mut PoseEditor, ctx: &mut ToolContext<'_>, ui: &mut
     for volume in &ctx.case.volumes {
         row_ui(ctx, ui, volume);
     }
-    if ctx.case.volumes.iter().filter(|v| v.visible).count() > 1 {
-        ui.add(Slider::new(&mut ctx.views.fusion, 0.0..=1.0).text("Second volume in sections"));
-    }
     if let Some(volume) = ctx.volume() {
         ui.separator();
         chosen_ui(pose, ctx, ui, volume);
@@ -90,6 +87,10 @@ fn chosen_ui(pose: &mut PoseEditor, ctx: &mut ToolContext<'_>, ui: &mut Ui, volu
             });
         }
         window_ui(ctx, ui, volume, grid.range());
+        let mut blend = volume.blend;
+        if ui.add(Slider::new(&mut blend, 0.0..=1.0).text("Weight in the sections")).changed() {
+            ctx.edit(Edit::SetBlend { id: volume.id.clone(), blend });
+        }
         texture_ui(ctx, ui, volume);
         let centre = views::ball_of(volume, &grid).centre;
         ui.collapsing("Place in the world", |ui| {

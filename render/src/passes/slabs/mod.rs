@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub(crate) use polygons::Proxy;
-pub(crate) use stack::{Draw, Member, Spacing, Stack, Vertex};
+pub(crate) use stack::{Draw, Member, Spacing, Stack, Stage, Vertex};
 
 use crate::gpu::{Gpu, GpuError};
 use crate::target::{Target, accumulation_format, bind_picture, buffer_entry, depth_state, texture_entry};
@@ -104,8 +104,8 @@ pub(crate) struct Slabs {
     pipelines: BTreeMap<Variant, wgpu::RenderPipeline>,
 }
 
-/// What a shader is specialised to: kinds of the slots, gaps, surfaces, translucent ones among them.
-type Variant = ([Kind; SLOTS], bool, bool, bool);
+/// What a shader is specialised to: stage, kinds of the slots, gaps, surfaces, translucent ones among them.
+type Variant = (Stage, [Kind; SLOTS], bool, bool, bool);
 
 /// The buffers and groups of one frame, ready to be recorded.
 #[derive(Debug)]
@@ -113,6 +113,8 @@ pub(crate) struct Prepared {
     vertices: wgpu::Buffer,
     scene: wgpu::BindGroup,
     surfaces: wgpu::BindGroup,
+    /// The same without what is being added up, and its picture, where more fragments meet than one draw takes.
+    summing: Option<(wgpu::BindGroup, wgpu::TextureView)>,
     /// A variant, a group of textures and a range of vertices each.
     draws: Vec<(Variant, wgpu::BindGroup, Draw)>,
 }
@@ -137,7 +139,7 @@ impl Slabs {
         });
         let volumes = group("slabs.volumes", &entries);
         let scene = group("slabs.scene", &[read(0), read(1), read(2), read(3), flat(4)]);
-        let surfaces = group("slabs.surfaces", &[read(0), read(1), flat(2), flat(3)]);
+        let surfaces = group("slabs.surfaces", &[read(0), read(1), flat(2), flat(3), flat(4)]);
         let picture = target::picture_layout(gpu);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("slabs.layout"),
@@ -214,21 +216,34 @@ impl Slabs {
         });
         // Any buffer does where the shader never looks.
         let [heads, layers] = lists.unwrap_or([&fragments; 2]);
-        let surfaces = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("slabs.surfaces"),
-            layout: &self.surfaces,
-            entries: &[
-                entry(0, heads.as_entire_binding()),
-                entry(1, layers.as_entire_binding()),
-                entry(2, wgpu::BindingResource::TextureView(&target.opaque_color_view)),
-                entry(3, wgpu::BindingResource::TextureView(&target.opaque_zeta_view)),
-            ],
-        });
+        let bind_surfaces = |optical: &wgpu::TextureView| {
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("slabs.surfaces"),
+                layout: &self.surfaces,
+                entries: &[
+                    entry(0, heads.as_entire_binding()),
+                    entry(1, layers.as_entire_binding()),
+                    entry(2, wgpu::BindingResource::TextureView(&target.opaque_color_view)),
+                    entry(3, wgpu::BindingResource::TextureView(&target.opaque_zeta_view)),
+                    entry(4, wgpu::BindingResource::TextureView(optical)),
+                ],
+            })
+        };
+        let sums = inputs.stack.draws.iter().any(|d| d.stage == Stage::Sum);
+        // Any picture does where the shader never looks.
+        let unused = &target.opaque_zeta_view;
+        let (surfaces, summing) = if sums {
+            let optical = optical(gpu, target.size);
+            (bind_surfaces(&optical), Some((bind_surfaces(unused), optical)))
+        } else {
+            (bind_surfaces(unused), None)
+        };
         let gaps = inputs.cylinders.iter().any(|c| c.outside == 1);
         let mut groups: BTreeMap<[usize; SLOTS], wgpu::BindGroup> = BTreeMap::new();
         let mut draws = Vec::with_capacity(inputs.stack.draws.len());
         for draw in &inputs.stack.draws {
-            let variant: Variant = (draw.slots.map(|s| s.0), gaps, draw.surfaces, lists.is_some());
+            let variant: Variant =
+                (draw.stage, draw.slots.map(|s| s.0), gaps, draw.surfaces, lists.is_some());
             let textures = draw.slots.map(|(kind, texture)| match kind {
                 Kind::None => usize::MAX,
                 _ => texture,
@@ -250,7 +265,7 @@ impl Slabs {
             wgpu::BufferUsages::VERTEX,
         );
         gpu.check()?;
-        Ok(Prepared { vertices, scene, surfaces, draws })
+        Ok(Prepared { vertices, scene, surfaces, summing, draws })
     }
 
     fn bind_volumes(
@@ -273,7 +288,7 @@ impl Slabs {
         })
     }
 
-    fn pipeline(&self, gpu: &Gpu, (kinds, gaps, surfaces, layers): Variant) -> wgpu::RenderPipeline {
+    fn pipeline(&self, gpu: &Gpu, (stage, kinds, gaps, surfaces, layers): Variant) -> wgpu::RenderPipeline {
         const NAMES: [&str; SLOTS] = ["KIND_0", "KIND_1", "KIND_2", "KIND_3"];
         let mut constants: Vec<(&str, f64)> =
             NAMES.iter().zip(kinds).map(|(name, kind)| (*name, f64::from(kind as u32))).collect();
@@ -286,6 +301,13 @@ impl Slabs {
             src_factor: wgpu::BlendFactor::OneMinusDstAlpha,
             dst_factor: wgpu::BlendFactor::One,
             operation: wgpu::BlendOperation::Add,
+        };
+        let add = wgpu::BlendComponent { dst_factor: wgpu::BlendFactor::One, ..under };
+        let add = wgpu::BlendComponent { src_factor: wgpu::BlendFactor::One, ..add };
+        let (entry_point, blend, depth_stencil) = match stage {
+            Stage::Whole => ("fs_main", under, Some(depth_state(false, wgpu::CompareFunction::GreaterEqual))),
+            Stage::Sum => ("fs_sum", add, None),
+            Stage::Mix => ("fs_mix", under, Some(depth_state(false, wgpu::CompareFunction::GreaterEqual))),
         };
         gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("slabs.pipeline"),
@@ -301,15 +323,15 @@ impl Slabs {
                 })],
             },
             primitive: Default::default(),
-            depth_stencil: Some(depth_state(false, wgpu::CompareFunction::GreaterEqual)),
+            depth_stencil,
             multisample: Default::default(),
             fragment: Some(wgpu::FragmentState {
                 module: &self.module,
-                entry_point: Some("fs_main"),
+                entry_point: Some(entry_point),
                 compilation_options: options,
                 targets: &[Some(wgpu::ColorTargetState {
                     format: accumulation_format(gpu),
-                    blend: Some(wgpu::BlendState { color: under, alpha: under }),
+                    blend: Some(wgpu::BlendState { color: blend, alpha: blend }),
                     write_mask: wgpu::ColorWrites::ALL,
                 })],
             }),
@@ -332,26 +354,47 @@ impl Slabs {
         let picture = bind_picture(gpu, &self.picture, &target.picture_view);
         let mut looks = 0;
         let mut next = 0;
-        while next < prepared.draws.len() {
-            let until = prepared.draws[next].2.slabs[0].saturating_add(SATURATE_EVERY);
+        let mut until = SATURATE_EVERY;
+        while let Some((_, _, first)) = prepared.draws.get(next) {
+            let slab = first.slabs[0];
+            if slab >= until {
+                until = slab + SATURATE_EVERY;
+                if next > 0 {
+                    looks += 1;
+                    self.saturate(encoder, target, frame, &picture, &rows);
+                }
+            }
+            let summing = prepared.summing.as_ref().filter(|_| first.stage == Stage::Sum);
+            let (surfaces, view, load, depth) = match summing {
+                Some((surfaces, optical)) => {
+                    (surfaces, optical, wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), None)
+                }
+                None => (
+                    &prepared.surfaces,
+                    &target.picture_view,
+                    wgpu::LoadOp::Load,
+                    Some(depth_attachment(target)),
+                ),
+            };
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("slabs"),
                 color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &target.picture_view,
+                    view,
                     depth_slice: None,
                     resolve_target: None,
-                    ops: KEEP,
+                    ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
                 })],
-                depth_stencil_attachment: Some(depth_attachment(target)),
+                depth_stencil_attachment: depth,
                 ..Default::default()
             });
             pass.set_scissor_rect(0, rows.start, target.size[0], rows.end - rows.start);
             pass.set_bind_group(0, frame, &[]);
             pass.set_bind_group(2, &prepared.scene, &[]);
-            pass.set_bind_group(3, &prepared.surfaces, &[]);
+            pass.set_bind_group(3, surfaces, &[]);
             pass.set_vertex_buffer(0, prepared.vertices.slice(..));
             while let Some((variant, volumes, draw)) = prepared.draws.get(next) {
-                if draw.slabs[1] >= until {
+                let is_sum = draw.stage == Stage::Sum;
+                if is_sum != summing.is_some() || draw.slabs[0] >= until {
                     break;
                 }
                 if let Some(pipeline) = self.pipelines.get(variant) {
@@ -361,27 +404,47 @@ impl Slabs {
                 }
                 next += 1;
             }
-            drop(pass);
-            if next < prepared.draws.len() {
-                looks += 1;
-                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("saturate"),
-                    depth_stencil_attachment: Some(depth_attachment(target)),
-                    ..Default::default()
-                });
-                pass.set_scissor_rect(0, rows.start, target.size[0], rows.end - rows.start);
-                pass.set_pipeline(&self.saturate);
-                pass.set_bind_group(0, frame, &[]);
-                pass.set_bind_group(1, &picture, &[]);
-                pass.draw(0..3, 0..1);
-            }
         }
         looks
     }
+
+    /// Marks the pixels that are finished in the depth buffer.
+    fn saturate(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &Target,
+        frame: &wgpu::BindGroup,
+        picture: &wgpu::BindGroup,
+        rows: &std::ops::Range<u32>,
+    ) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("saturate"),
+            depth_stencil_attachment: Some(depth_attachment(target)),
+            ..Default::default()
+        });
+        pass.set_scissor_rect(0, rows.start, target.size[0], rows.end - rows.start);
+        pass.set_pipeline(&self.saturate);
+        pass.set_bind_group(0, frame, &[]);
+        pass.set_bind_group(1, picture, &[]);
+        pass.draw(0..3, 0..1);
+    }
 }
 
-const KEEP: wgpu::Operations<wgpu::Color> =
-    wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store };
+/// A picture to add optical depths up in.
+fn optical(gpu: &Gpu, [width, height]: [u32; 2]) -> wgpu::TextureView {
+    gpu.count_call();
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("slabs.optical"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: accumulation_format(gpu),
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
 
 fn depth_attachment(target: &Target) -> wgpu::RenderPassDepthStencilAttachment<'_> {
     wgpu::RenderPassDepthStencilAttachment {
@@ -402,6 +465,7 @@ pub(crate) fn upload(
     bytes: &[u8],
     usage: wgpu::BufferUsages,
 ) -> wgpu::Buffer {
+    gpu.count_call();
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size: (bytes.len() as u64).max(256).next_multiple_of(4),

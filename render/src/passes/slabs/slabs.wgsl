@@ -52,8 +52,6 @@ struct Cylinder {
 }
 
 
-const SKIP_LAYERS: u32 = 0x80000000u;
-
 struct Component {
     fragments: array<u32, 4>,
 }
@@ -74,6 +72,8 @@ struct Component {
 @group(3) @binding(1) var<storage, read> layers: array<Layer>;
 @group(3) @binding(2) var opaque_color: texture_2d<f32>;
 @group(3) @binding(3) var opaque_zeta: texture_2d<f32>;
+// What `fs_sum` added up; nothing there while it does.
+@group(3) @binding(4) var optical: texture_2d<f32>;
 
 // What is in each slot: one of the kinds below. Fixed when the pipeline is made, so that empty slots and
 // unused branches cost nothing.
@@ -394,13 +394,12 @@ fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
     let ndc = ndc_of(pixel);
     let e = vec3<f32>(1.0, ndc);
     let ray = vec4<f32>(ray_direction(ndc), mm_per_zeta(ndc));
-    let component = in.component & ~SKIP_LAYERS;
     let first = in.slab * frame.steps;
     let z0 = f32(first) * frame.step_mm;
     let z1 = f32(first + frame.steps) * frame.step_mm;
 
     var s0: Slot; var s1: Slot; var s2: Slot; var s3: Slot;
-    let ids = components[component].fragments;
+    let ids = components[in.component].fragments;
     if KIND_0 != KIND_NONE { s0 = open_slot(ids[0], e, z0, z1); begin(KIND_0, &s0, ids[0], volume_0); }
     if KIND_1 != KIND_NONE { s1 = open_slot(ids[1], e, z0, z1); begin(KIND_1, &s1, ids[1], volume_1); }
     if KIND_2 != KIND_NONE { s2 = open_slot(ids[2], e, z0, z1); begin(KIND_2, &s2, ids[2], volume_2); }
@@ -411,7 +410,7 @@ fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
     var wall = 3.4e38;
     if SURFACES {
         wall = textureLoad(opaque_zeta, pixel, 0).r;
-        if LAYERS && (in.component & SKIP_LAYERS) == 0u {
+        if LAYERS {
             layer = first_layer(pixel, z0);
         }
     }
@@ -443,7 +442,7 @@ fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
         if KIND_1 != KIND_NONE { sum += advance(KIND_1, &s1, ids[1], volume_1, end, ray); }
         if KIND_2 != KIND_NONE { sum += advance(KIND_2, &s2, ids[2], volume_2, end, ray); }
         if KIND_3 != KIND_NONE { sum += advance(KIND_3, &s3, ids[3], volume_3, end, ray); }
-                        let part = absorbed_per_depth(sum.a);
+        let part = absorbed_per_depth(sum.a);
         color += (1.0 - alpha) * part * sum.rgb;
         alpha += (1.0 - alpha) * part * sum.a;
 
@@ -458,13 +457,100 @@ fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
                 layer = layer_after(pixel, layer);
                 next = k;
             } else if at_wall {
-                let seen = select(0.0, 1.0 - alpha, wall >= z0 && (in.component & SKIP_LAYERS) == 0u);
+                let seen = select(0.0, 1.0 - alpha, wall >= z0);
                 color += seen * textureLoad(opaque_color, pixel, 0).rgb;
                 alpha += seen;
                 next = frame.steps;
             }
         }
         k = next;
+    }
+    return vec4<f32>(color, alpha);
+}
+
+// Where more fragments meet than there are slots, a slab is one sub-step: what each holds of optical depth x colour
+// and optical depth is added up by several draws.
+@fragment
+fn fs_sum(in: VertexOut) -> @location(0) vec4<f32> {
+    let ndc = ndc_of(vec2<u32>(in.position.xy));
+    let e = vec3<f32>(1.0, ndc);
+    let ray = vec4<f32>(ray_direction(ndc), mm_per_zeta(ndc));
+    let z0 = f32(in.slab * frame.steps) * frame.step_mm;
+    let z1 = f32((in.slab + 1u) * frame.steps) * frame.step_mm;
+    let ids = components[in.component].fragments;
+    var sum = vec4<f32>(0.0);
+    if KIND_0 != KIND_NONE {
+        var slot = open_slot(ids[0], e, z0, z1);
+        begin(KIND_0, &slot, ids[0], volume_0);
+        sum += advance(KIND_0, &slot, ids[0], volume_0, z1, ray);
+    }
+    if KIND_1 != KIND_NONE {
+        var slot = open_slot(ids[1], e, z0, z1);
+        begin(KIND_1, &slot, ids[1], volume_1);
+        sum += advance(KIND_1, &slot, ids[1], volume_1, z1, ray);
+    }
+    if KIND_2 != KIND_NONE {
+        var slot = open_slot(ids[2], e, z0, z1);
+        begin(KIND_2, &slot, ids[2], volume_2);
+        sum += advance(KIND_2, &slot, ids[2], volume_2, z1, ray);
+    }
+    if KIND_3 != KIND_NONE {
+        var slot = open_slot(ids[3], e, z0, z1);
+        begin(KIND_3, &slot, ids[3], volume_3);
+        sum += advance(KIND_3, &slot, ids[3], volume_3, z1, ray);
+    }
+    return sum;
+}
+
+// The slab of `fs_sum` and its surfaces; between two of them the sum is taken as even.
+@fragment
+fn fs_mix(in: VertexOut) -> @location(0) vec4<f32> {
+    let pixel = vec2<u32>(in.position.xy);
+    let z0 = f32(in.slab * frame.steps) * frame.step_mm;
+    let z1 = f32((in.slab + 1u) * frame.steps) * frame.step_mm;
+    let sum = textureLoad(optical, pixel, 0) / (z1 - z0);
+    var layer = NO_LAYER;
+    var wall = 3.4e38;
+    if SURFACES {
+        wall = textureLoad(opaque_zeta, pixel, 0).r;
+        if LAYERS {
+            layer = first_layer(pixel, z0);
+        }
+    }
+    var color = vec3<f32>(0.0);
+    var alpha = 0.0;
+    var at = z0;
+    var rounds = 1u;
+    if LAYERS {
+        rounds += frame.layer_most;
+    }
+    for (var round = 0u; round < rounds; round++) {
+        if at >= z1 {
+            continue;
+        }
+        var stop = wall;
+        if LAYERS && layer != NO_LAYER {
+            stop = min(stop, layers[layer].zeta);
+        }
+        let end = clamp(stop, at, z1);
+        let depth = sum * (end - at);
+        let part = absorbed_per_depth(depth.a);
+        color += (1.0 - alpha) * part * depth.rgb;
+        alpha += (1.0 - alpha) * part * depth.a;
+        at = end;
+        if SURFACES {
+            if LAYERS && layer != NO_LAYER && stop < z1 && stop < wall {
+                let surface = layers[layer].color;
+                color += (1.0 - alpha) * surface.a * surface.rgb;
+                alpha += (1.0 - alpha) * surface.a;
+                layer = layer_after(pixel, layer);
+            } else if wall < z1 {
+                let seen = select(0.0, 1.0 - alpha, wall >= z0);
+                color += seen * textureLoad(opaque_color, pixel, 0).rgb;
+                alpha += seen;
+                at = z1;
+            }
+        }
     }
     return vec4<f32>(color, alpha);
 }

@@ -23,15 +23,24 @@ pub(crate) struct Vertex {
     pub(crate) component: u32,
 }
 
-/// Set in [`Vertex::component`] where another draw of the slab takes the surfaces.
-pub(crate) const SKIP_LAYERS: u32 = 0x8000_0000;
-
 /// What the slots of a draw hold: kind and texture of each.
 pub(crate) type Slots = [(Kind, usize); SLOTS];
+
+/// What a draw does with the fragments that it integrates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Stage {
+    /// They are all that meet there: the picture passes through them and through the surfaces among them.
+    Whole,
+    /// More meet than a draw takes: their optical depths are added up first.
+    Sum,
+    /// The picture passes through what was added up, and through the surfaces.
+    Mix,
+}
 
 /// Consecutive triangles with the same slots.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Draw {
+    pub(crate) stage: Stage,
     pub(crate) slots: Slots,
     /// Whether surfaces may lie in it.
     pub(crate) surfaces: bool,
@@ -128,53 +137,56 @@ impl Stack {
     }
 
     fn add(&mut self, slab: u32, members: &[Member], group: &Group) {
-        let polygon = &group.outline;
         let surfaces = group.members.iter().any(|&m| members[m].volume.is_none());
-        let mut volumes: Vec<_> = group
-            .members
-            .iter()
-            .filter_map(|&m| {
-                let depth = members[m].proxy.depth;
-                members[m].volume.map(|v| (v, depth[0] + depth[1]))
-            })
-            .collect();
-        // What does not fit in one draw goes front to back.
-        if group.members.len() > SLOTS {
-            volumes.sort_by(|a, b| a.1.total_cmp(&b.1));
-        }
+        let mut volumes: Vec<_> = group.members.iter().filter_map(|&m| members[m].volume).collect();
         self.most_overlapping = self.most_overlapping.max(volumes.len());
-        let mut nothing: [(u32, Kind, usize); 0] = [];
-        let empty = volumes.is_empty().then_some(&mut nothing[..]);
-        let mut volumes: Vec<_> = volumes.into_iter().map(|(volume, _)| volume).collect();
-        for (number, chunk) in volumes.chunks_mut(SLOTS).chain(empty).enumerate() {
-            // By kind, so that fewer different shaders are made.
-            chunk.sort_by_key(|&(fragment, kind, _)| (kind, fragment));
-            let mut slots: Slots = [(Kind::None, 0); SLOTS];
-            let mut fragments = [u32::MAX; SLOTS];
-            for (slot, &mut (fragment, kind, texture)) in chunk.iter_mut().enumerate() {
-                slots[slot] = (kind, texture);
-                fragments[slot] = fragment;
+        // By kind, so that fewer different shaders are made.
+        volumes.sort_by_key(|&(fragment, kind, _)| (kind, fragment));
+        if volumes.len() <= SLOTS {
+            self.draw(slab, Stage::Whole, &volumes, surfaces, &group.outline);
+            return;
+        }
+        for chunk in volumes.chunks(SLOTS) {
+            self.draw(slab, Stage::Sum, chunk, false, &group.outline);
+        }
+        self.draw(slab, Stage::Mix, &[], surfaces, &group.outline);
+    }
+
+    fn draw(
+        &mut self,
+        slab: u32,
+        stage: Stage,
+        volumes: &[(u32, Kind, usize)],
+        surfaces: bool,
+        outline: &Polygon,
+    ) {
+        let mut slots: Slots = [(Kind::None, 0); SLOTS];
+        let mut fragments = [u32::MAX; SLOTS];
+        for (slot, &(fragment, kind, texture)) in volumes.iter().enumerate() {
+            slots[slot] = (kind, texture);
+            fragments[slot] = fragment;
+        }
+        let known = self.components.iter().rposition(|c| *c == fragments);
+        let component = known.unwrap_or_else(|| {
+            self.components.push(fragments);
+            self.components.len() - 1
+        }) as u32;
+        let first = self.vertices.len() as u32;
+        let corner = |p: [f64; 2]| Vertex { ndc: p.map(|c| c as f32), slab, component };
+        for pair in outline[1..].windows(2) {
+            self.vertices.extend([outline[0], pair[0], pair[1]].map(corner));
+        }
+        let end = self.vertices.len() as u32;
+        match self.draws.last_mut() {
+            Some(last)
+                if stage == Stage::Whole
+                    && (last.stage, last.slots, last.surfaces) == (stage, slots, surfaces)
+                    && slab - last.slabs[0] < SATURATE_EVERY =>
+            {
+                (last.vertices.end, last.slabs[1]) = (end, slab);
             }
-            let known = self.components.iter().rposition(|c| *c == fragments);
-            let component = known.unwrap_or_else(|| {
-                self.components.push(fragments);
-                self.components.len() - 1
-            }) as u32;
-            let component = if number > 0 { component | SKIP_LAYERS } else { component };
-            let first = self.vertices.len() as u32;
-            let corner = |p: [f64; 2]| Vertex { ndc: p.map(|c| c as f32), slab, component };
-            for pair in polygon[1..].windows(2) {
-                self.vertices.extend([polygon[0], pair[0], pair[1]].map(corner));
-            }
-            let end = self.vertices.len() as u32;
-            match self.draws.last_mut() {
-                Some(last)
-                    if (last.slots, last.surfaces) == (slots, surfaces)
-                        && slab - last.slabs[0] < SATURATE_EVERY =>
-                {
-                    (last.vertices.end, last.slabs[1]) = (end, slab);
-                }
-                _ => self.draws.push(Draw { slots, surfaces, vertices: first..end, slabs: [slab; 2] }),
+            _ => {
+                self.draws.push(Draw { stage, slots, surfaces, vertices: first..end, slabs: [slab; 2] });
             }
         }
     }

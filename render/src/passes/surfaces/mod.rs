@@ -360,7 +360,7 @@ impl Surfaces {
                 pass.draw(0..draw.vertices, 0..1);
             }
         }
-        gpu.queue.submit([encoder.finish()]);
+        gpu.submit(Some(encoder));
         let totals: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(gpu, &lists.totals, 8)?);
         Ok((totals[0], totals[1]))
     }

@@ -3,7 +3,9 @@
 mod closed;
 mod crossings;
 mod exactness;
+mod labels;
 mod march;
+mod modes;
 mod pieces;
 mod surfaces;
 
@@ -35,6 +37,8 @@ fn volume(grid: Grid, transfer: Arc<Transfer>) -> VolumeItem {
         shading: Shading::None,
         texture: TextureFormat::Auto,
         pieces: vec![Piece::whole()],
+        labels: None,
+        mode: Default::default(),
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use ::render::scene::{Camera, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem};
+use ::render::scene::{Camera, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem, VolumeMode};
 use ::render::volume::{Affine, ControlPoint, Cutter, Point, Side, Transfer, Vector, synth};
 
 use super::ray::{Cube, Ray, integral, layers};
@@ -200,6 +200,8 @@ fn scene(
         shading: Shading::None,
         texture: TextureFormat::R32f,
         pieces: vec![Piece::whole()],
+        labels: None,
+        mode: VolumeMode::Composite,
     };
     let eye = Point::new(0.0, -EYE_MM, 0.0);
     let camera = Camera { eye, target: Point::origin(), up: Vector::z(), projection };
