@@ -122,7 +122,7 @@ fn values(random: &mut Random, extent: [usize; 3]) -> Vec<f64> {
             match kind {
                 0 => high,
                 1 => random.between(low, high),
-                2 => (low + high) / 2.0 + slope.dot(&Vector::new(x as f64, y as f64, z as f64)),
+                2 => f64::midpoint(low, high) + slope.dot(&Vector::new(x as f64, y as f64, z as f64)),
                 3 => {
                     if (x + y + z) % 2 == 0 {
                         low

@@ -126,7 +126,9 @@ fn a_clear_volume_and_a_clear_surface_change_nothing() {
         let mut extra = cases::any(random, Contents { volumes: 1, cut: false, meshes: 1 }).scene;
         for volume in &mut extra.volumes {
             let mut points = volume.transfer.points().to_vec();
-            points.iter_mut().for_each(|p| p.rgba[3] = 0.0);
+            for point in &mut points {
+                point.rgba[3] = 0.0;
+            }
             let clear = Transfer::new(points, 1.0).expect("the same values");
             volume.transfer = Arc::new(clear);
         }

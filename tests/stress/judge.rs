@@ -39,7 +39,7 @@ pub(super) fn right(scene: &Scene, picture: &FloatImage, most: f64) -> Result<()
         *near = std::array::from_fn(|c| if p[c].is_nan() { near[c] } else { p[c].clamp(near[c], high[c]) });
     }
     match worst(picture, &nearest) {
-        Some(wrong) if !(wrong.apart <= most) => Err(wrong.text()),
+        Some(wrong) if wrong.apart > most => Err(wrong.text()),
         _ => Ok(()),
     }
 }
@@ -47,7 +47,7 @@ pub(super) fn right(scene: &Scene, picture: &FloatImage, most: f64) -> Result<()
 /// Refuses two pictures that differ by more than `most`/255.
 pub(super) fn same(a: &FloatImage, b: &FloatImage, most: f64) -> Result<(), String> {
     match worst(a, b) {
-        Some(wrong) if !(wrong.apart <= most) => Err(wrong.text()),
+        Some(wrong) if wrong.apart > most => Err(wrong.text()),
         _ => Ok(()),
     }
 }
