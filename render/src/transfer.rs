@@ -4,6 +4,8 @@ use crate::volume::Transfer;
 
 /// Entries of a table.
 pub(crate) const NODES: usize = 4096;
+/// Nodes below the first value, and above the last.
+const ROOM: usize = 4;
 /// Rows a table takes: extinction, and its antiderivative in two parts.
 pub(crate) const ROWS: usize = 3;
 
@@ -29,12 +31,19 @@ impl Table {
         // Beyond its points the function is constant, beyond the grid's range it is never asked.
         let low = points[0].value.clamp(least, greatest);
         let high = points[points.len() - 1].value.clamp(least, greatest);
-        // Some room beyond either end, so that a jump there is inside the table.
-        let room = if high > low { (high - low) * 1e-3 } else { 1.0 };
-        let first = low - room;
-        let step = (high - low + 2.0 * room) / (NODES - 1) as f64;
+        // Some nodes of room beyond either end, so that a jump there is inside the table. Both ends are nodes
+        // themselves: what is at a jump there, a whole volume of one value perhaps, is on its later side.
+        let inner = (NODES - 1 - 2 * ROOM) as f64;
+        let step = if high > low { (high - low) / inner } else { 1.0 / ROOM as f64 };
+        let first = low - step * ROOM as f64;
+        // The ends are met without rounding.
+        let value = |j: usize| match j {
+            ROOM => low,
+            j if j + ROOM + 1 == NODES => high,
+            j => first + step * j as f64,
+        };
         let node = |j: usize| {
-            let (c, tau) = transfer.classify(first + step * j as f64);
+            let (c, tau) = transfer.classify(value(j));
             [c[0] * tau, c[1] * tau, c[2] * tau, tau]
         };
         let nodes: Vec<[f64; 4]> = (0..NODES).map(node).collect();
@@ -65,6 +74,25 @@ mod tests {
             Transfer::new(vec![point(-1e6, 0.0), point(0.0, 0.0), point(1.0, 0.5), point(1e6, 0.5)], 1.0);
         let table = Table::new(&transfer.expect("transfer"), [-2.0, 2.0]);
         assert!(table.step < 0.01, "one unit of the ramp has hundreds of nodes: {}", table.step);
+    }
+
+    #[test]
+    fn a_jump_at_the_end_of_the_range_belongs_to_its_later_point() {
+        let point = |value, a| ControlPoint { value, rgba: [1.0, 1.0, 1.0, a] };
+        let jump = |at| Transfer::new(vec![point(at, 0.9), point(at, 0.5)], 1.0).expect("transfer");
+        let known = -(0.5_f64).ln();
+        for (at, range, node) in
+            [(0.1, [0.1, 0.1], ROOM), (-7.3, [-7.3, 4.0], ROOM), (0.7, [-3.0, 0.7], NODES - 1 - ROOM)]
+        {
+            let points = [point(-1e3, 0.9), point(1e3, 0.5)];
+            let mut all = vec![points[0]];
+            all.extend(jump(at).points());
+            all.push(points[1]);
+            let table = Table::new(&Transfer::new(all, 1.0).expect("transfer"), range);
+            assert!((f64::from(table.texels[node][3]) - known).abs() < 1e-6, "at {at}");
+            let place = (at - table.first) / table.step;
+            assert!((place - node as f64).abs() < 1e-6, "{at} is node {node}, not {place}");
+        }
     }
 
     #[test]

@@ -122,7 +122,7 @@ fn values(random: &mut Random, extent: [usize; 3]) -> Vec<f64> {
             match kind {
                 0 => high,
                 1 => random.between(low, high),
-                2 => (low + high) / 2.0 + slope.dot(&Vector::new(x as f64, y as f64, z as f64)),
+                2 => f64::midpoint(low, high) + slope.dot(&Vector::new(x as f64, y as f64, z as f64)),
                 3 => {
                     if (x + y + z) % 2 == 0 {
                         low
@@ -194,7 +194,10 @@ fn camera(random: &mut Random, volumes: &[VolumeItem], size: f64) -> Camera {
     let up = if random.chance(0.2) {
         target - eye
     } else {
-        random.one(&[Vector::z(), Vector::y(), random.direction()])
+        {
+            let any = random.direction();
+            random.one(&[Vector::z(), Vector::y(), any])
+        }
     };
     let projection = if random.chance(0.3) {
         Projection::Parallel { height_mm: size * random.power(-0.5, 0.5) }
@@ -242,5 +245,8 @@ pub(super) fn fine(case: &Case) -> f64 {
     let spacing = |v: &VolumeItem| v.grid.spacing_mm().into_iter().fold(f64::INFINITY, f64::min);
     let finest = case.scene.volumes.iter().map(spacing).fold(f64::INFINITY, f64::min);
     let voxels = 2.0 * case.size_mm / finest;
-    (voxels / 1500.0).clamp(1.0 / 32.0, 0.25)
+    // Where many pieces meet, every sub-step is a slab of its own.
+    let pieces: usize = case.scene.volumes.iter().map(|v| v.pieces.len()).sum();
+    let most = if pieces > 4 { 250.0 } else { 1000.0 };
+    (voxels / most).clamp(1.0 / 32.0, 1.0)
 }

@@ -124,8 +124,8 @@ fn sheets_at_one_place_composite_in_their_order() {
         let at = Point::new(0.3, random.between(-5.0, 5.0), 0.1);
         for _ in 0..=random.below(6) {
             let item = sheet(random, at, Vector::y());
-            for c in 0..3 {
-                color[c] += through * item.opacity * item.color[c];
+            for (sum, own) in color.iter_mut().zip(item.color) {
+                *sum += through * item.opacity * own;
             }
             through *= 1.0 - item.opacity;
             scene.meshes.push(item);

@@ -1,7 +1,7 @@
 //! Whether a picture is the right one.
 //!
 //! Where a ray touches an edge of a surface, either side of it is right: a pixel passes if it lies among what the
-//! reference shows when the eye is moved by a ten thousandth of a pixel.
+//! reference shows when the eye is moved by a thousandth of a pixel.
 
 use render::image::FloatImage;
 use render::scene::{Projection, Scene};
@@ -39,7 +39,7 @@ pub(super) fn right(scene: &Scene, picture: &FloatImage, most: f64) -> Result<()
         *near = std::array::from_fn(|c| if p[c].is_nan() { near[c] } else { p[c].clamp(near[c], high[c]) });
     }
     match worst(picture, &nearest) {
-        Some(wrong) if !(wrong.apart <= most) => Err(wrong.text()),
+        Some(wrong) if wrong.apart > most => Err(wrong.text()),
         _ => Ok(()),
     }
 }
@@ -47,7 +47,7 @@ pub(super) fn right(scene: &Scene, picture: &FloatImage, most: f64) -> Result<()
 /// Refuses two pictures that differ by more than `most`/255.
 pub(super) fn same(a: &FloatImage, b: &FloatImage, most: f64) -> Result<(), String> {
     match worst(a, b) {
-        Some(wrong) if !(wrong.apart <= most) => Err(wrong.text()),
+        Some(wrong) if wrong.apart > most => Err(wrong.text()),
         _ => Ok(()),
     }
 }

@@ -190,6 +190,11 @@ impl Grid {
     #[must_use]
     pub fn with_padding(mut self, value: f64) -> Self {
         self.padding = value;
+        if self.non_finite == self.samples.len() {
+            self.range = [value; 2];
+        } else if self.non_finite > 0 {
+            self.range = [self.range[0].min(value), self.range[1].max(value)];
+        }
         self
     }
 
@@ -225,7 +230,7 @@ impl Grid {
         self.world_from_voxel.column_lengths()
     }
 
-    /// Least and greatest finite value, after rescale; `[0, 0]` where none is finite.
+    /// Least and greatest value, after rescale; that of the padding is among them where a sample is not finite.
     pub fn range(&self) -> [f64; 2] {
         self.range
     }
@@ -330,7 +335,9 @@ mod tests {
         let grid = Grid::new([4, 1, 1], samples, Rescale::default(), Affine::identity()).expect("grid");
         assert_eq!((grid.non_finite(), grid.padding()), (2, 3.0), "counted and padded");
         assert_eq!(grid.value(2, 0, 0), 3.0, "infinite reads as padding");
-        assert_eq!(grid.with_padding(-1.0).value(0, 0, 0), -1.0, "padding may be set");
+        let padded = grid.with_padding(-1.0);
+        assert_eq!(padded.value(0, 0, 0), -1.0, "padding may be set");
+        assert_eq!(padded.range()[0], -1.0, "a value that occurs is in the range");
     }
 
     #[test]

@@ -1,6 +1,8 @@
-//! `bench`: run time beside error. One file a benchmark: `frame` draws, `textures` makes textures, `accuracy` refines
-//! scenes of known pictures, `pareto` sweeps what a picture can be made cheaper by, `skips` says what skipping saves; `series` and `play`, of volumes over
-//! time, lie beside what they measure.
+//! `bench`: run time beside error, one file a benchmark.
+//!
+//! `frame` draws, `textures` makes textures, `accuracy` refines scenes of known pictures, `pareto` sweeps what a picture
+//! can be made cheaper by, `skips` says what skipping saves; `series` and `play`, of volumes over time, lie beside what
+//! they measure.
 //!
 //! Each result is one JSON object a line (`--json`) or a line of a table. Times are the median of
 //! `REPEATS` runs after one that is not counted, so that neither the first upload nor one busy moment

@@ -1,7 +1,7 @@
 //! A foreign renderer as a process that draws a frame whenever it is asked, so that both can take turns.
 //!
 //! It is started with a case file, `--mapper NAME`, `--step VOXELS`, `--size WxH`, `--float` and `--serve`; it says
-//! `ready`, then answers `render` by the milliseconds of one frame and `write FILE` by `ok`, the file being a NumPy array
+//! `ready`, then answers `render` by the milliseconds of one frame and `write FILE` by `ok`, the file being a `NumPy` array
 //! of `height`·`width`·4 floats. `tests/peers/vtk/volume.py` is one.
 
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -99,7 +99,7 @@ fn said(what: &str) -> Failure {
     Failure::Other(format!("the peer answered \"{what}\"; run its command by itself to see why"))
 }
 
-/// The numbers of a NumPy file, version 1, of little-endian `f32`, rows first.
+/// The numbers of a `NumPy` file, version 1, of little-endian `f32`, rows first.
 fn pixels(bytes: &[u8], count: usize) -> Option<Vec<[f32; 4]>> {
     let rest = bytes.strip_prefix(b"\x93NUMPY\x01\x00")?;
     let (length, rest) = rest.split_first_chunk::<2>()?;

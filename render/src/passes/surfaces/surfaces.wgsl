@@ -78,7 +78,8 @@ fn vs_main(@builtin(vertex_index) index: u32) -> VertexOut {
     let farthest = frame.near_mm + max(out.a.z, max(out.b.z, out.c.z));
     var low = vec2<f32>(-1.0);
     var high = vec2<f32>(1.0);
-    if frame.perspective < 0.5 || nearest > NEAR_CLIP_MM {
+    // A corner that is near the eye beside the others has lost digits there: the whole picture is looked at then.
+    if frame.perspective < 0.5 || nearest > max(NEAR_CLIP_MM, 0.01 * farthest) {
         let a = ndc_of_view(out.a);
         let b = ndc_of_view(out.b);
         let c = ndc_of_view(out.c);

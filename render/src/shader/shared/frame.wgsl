@@ -61,5 +61,6 @@ fn depth_of(zeta: f32) -> f32 {
     return 1.0 - zeta / frame.depth_mm;
 }
 
-// Surfaces nearer to a perspective eye than this are not drawn.
-const NEAR_CLIP_MM: f32 = 0.01;
+// Surfaces nearer to a perspective eye than this are not told apart. The depth is a float, which keeps its digits
+// however small it gets.
+const NEAR_CLIP_MM: f32 = 1e-6;

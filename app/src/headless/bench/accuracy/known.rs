@@ -54,7 +54,7 @@ pub(super) fn for_spacing() -> Result<Vec<Known>, Failure> {
 /// A cube of one value, seen askew.
 fn slab() -> Result<Known, Failure> {
     let cube = cube(12, true)?;
-    let scene = scene(cube, &[(0.0, RED, 0.3), (1.0, RED, 0.3)], false, |_| 0.5)?;
+    let scene = scene(&cube, &[(0.0, RED, 0.3), (1.0, RED, 0.3)], false, |_| 0.5)?;
     let tau = tau(0.3);
     let truth = move |ray: &Ray| layers(&[(length(&cube.stretches(ray)), RED, tau)]);
     Ok(Known { name: "slab", scene, truth: Box::new(truth) })
@@ -64,7 +64,7 @@ fn slab() -> Result<Known, Failure> {
 fn ramp() -> Result<Known, Failure> {
     let cube = cube(12, false)?;
     let (first, last) = (0.05, 0.6);
-    let scene = scene(cube, &[(0.0, RED, first), (1.0, RED, last)], false, move |p| p.y / 11.0)?;
+    let scene = scene(&cube, &[(0.0, RED, first), (1.0, RED, last)], false, move |p| p.y / 11.0)?;
     let voxel = SIDE_MM / 12.0;
     let primitive = |a: f64| (1.0 - a) * (-a).ln_1p() + a;
     let rising = (primitive(last) - primitive(first)) / (last - first) / UNIT_MM * (11.0 * voxel);
@@ -81,7 +81,7 @@ fn jump() -> Result<Known, Failure> {
     let cube = cube(12, true)?;
     let at = 0.37;
     let points = [(0.0, RED, 0.1), (at, RED, 0.1), (at, BLUE, 0.5), (1.0, BLUE, 0.5)];
-    let scene = scene(cube, &points, false, |p| p.x / 11.0)?;
+    let scene = scene(&cube, &points, false, |p| p.x / 11.0)?;
     let truth = move |ray: &Ray| {
         let inverse = cube.world_from_voxel.inverse();
         let (p, d) = (inverse.point(&ray.origin).x, inverse.vector(&ray.direction).x);
@@ -99,7 +99,7 @@ fn jump() -> Result<Known, Failure> {
 /// A cube of one value, cut askew, of which the part before the plane is left.
 fn cut() -> Result<Known, Failure> {
     let cube = cube(12, true)?;
-    let mut scene = scene(cube, &[(0.0, BLUE, 0.4), (1.0, BLUE, 0.4)], false, |_| 0.5)?;
+    let mut scene = scene(&cube, &[(0.0, BLUE, 0.4), (1.0, BLUE, 0.4)], false, |_| 0.5)?;
     let (point, normal) = (Point::new(0.7, -1.3, 0.4), Vector::new(0.3, 1.0, -0.2));
     let cutter = Cutter::plane(point, normal).map_err(|e| Failure::Other(e.to_string()))?;
     scene.volumes[0].pieces = vec![Piece { keep: vec![(cutter, Side::Minus)], pose: Affine::identity() }];
@@ -120,7 +120,7 @@ pub(super) fn product() -> Result<Known, Failure> {
         let [x, y, z] = [p.x / 11.0, p.y / 11.0, p.z / 11.0];
         (0.3 + 0.7 * x) * (1.0 - 0.6 * y) * (0.4 + 0.6 * z)
     };
-    let scene = scene(cube, &[(0.0, RED, 0.02), (1.0, BLUE, 0.7)], true, value)?;
+    let scene = scene(&cube, &[(0.0, RED, 0.02), (1.0, BLUE, 0.7)], true, value)?;
     let truth = move |ray: &Ray| {
         integral(&cube.stretches(ray), |t| linear(value(&cube.held(&ray.at(t))), [0.02, 0.7]))
     };
@@ -132,7 +132,7 @@ pub(super) fn ball(count: usize) -> Result<Known, Failure> {
     let cube = cube(count, false)?;
     let value = |p: &Point| (1.0 - p.coords.norm_squared() / (BALL_MM * BALL_MM)).max(0.0).powi(3);
     let place = cube.world_from_voxel;
-    let scene = scene(cube, &[(0.0, RED, 0.0), (1.0, BLUE, 0.7)], false, move |p| value(&place.point(p)))?;
+    let scene = scene(&cube, &[(0.0, RED, 0.0), (1.0, BLUE, 0.7)], false, move |p| value(&place.point(p)))?;
     let truth = move |ray: &Ray| {
         let middle = -ray.origin.coords.dot(&ray.direction);
         let half = BALL_MM * BALL_MM - ray.at(middle).coords.norm_squared();
@@ -176,7 +176,7 @@ fn cube(count: usize, turned: bool) -> Result<Cube, Failure> {
 
 /// A scene of one cube with `value` at each voxel, through control points of value, colour and opacity.
 fn scene(
-    cube: Cube,
+    cube: &Cube,
     points: &[(f64, [f64; 3], f64)],
     perspective: bool,
     value: impl Fn(&Point) -> f64 + Sync,
