@@ -26,9 +26,10 @@ pub fn mesh_outline(section: &Section, mesh: &TriangleMesh, pose: &Affine) -> Ve
     mesh.triangles().par_iter().filter_map(crossing).collect()
 }
 
-/// Where a cutter crosses the section's plane within `reach_mm` of the section's centre: polylines in
-/// world mm, those of both borders where there is a kerf. Of a blade it is the outline of what it has
-/// passed. Parallel planes give none.
+/// Where a cutter crosses the section's plane within `reach_mm` of the section's centre: polylines in world mm.
+///
+/// Where there is a kerf, those of both its borders; of a blade the outline of what it has passed. Parallel planes
+/// give none.
 pub fn cutter_outline(section: &Section, cutter: &Cutter, reach_mm: f64) -> Vec<Vec<Point>> {
     let (body, _) = cutter.solid(Side::Plus);
     let mut lines = body_outline(section, &body, body.faces().len(), reach_mm);
