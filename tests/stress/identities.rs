@@ -30,7 +30,7 @@ fn all(
 
 #[test]
 fn a_volume_cut_in_two_and_left_in_place_is_the_whole() {
-    each("cut in two", 300, |random| {
+    each("cut in two", 100, |random| {
         let case = cases::any(random, Contents { volumes: 1, cut: false, meshes: 0 });
         let mut cut = case.scene.clone();
         let volume = &mut cut.volumes[0];
@@ -48,7 +48,7 @@ fn a_volume_cut_in_two_and_left_in_place_is_the_whole() {
 
 #[test]
 fn a_scene_moved_and_turned_with_its_camera_is_the_same_picture() {
-    each("moved alike", 200, |random| {
+    each("moved alike", 60, |random| {
         let case = surfaceless(random);
         let by = Affine::translation(random.shift(case.size_mm * 10.0)) * random.turn();
         let moved = cases::moved(&case.scene, &by);
@@ -63,7 +63,7 @@ fn a_scene_moved_and_turned_with_its_camera_is_the_same_picture() {
 
 #[test]
 fn a_fragment_moved_away_and_back_is_where_it_was() {
-    each("away and back", 200, |random| {
+    each("away and back", 60, |random| {
         let case = surfaceless(random);
         let by = Affine::translation(random.shift(case.size_mm * 1e3)) * random.turn();
         let mut back = case.scene.clone();
@@ -83,7 +83,7 @@ fn a_fragment_moved_away_and_back_is_where_it_was() {
 
 #[test]
 fn a_mirrored_scene_is_the_mirrored_picture() {
-    each("mirrored", 200, |random| {
+    each("mirrored", 60, |random| {
         let case = surfaceless(random);
         let mirror = Affine::from_columns(-Vector::x(), Vector::y(), Vector::z(), Point::origin());
         let mirrored = cases::moved(&case.scene, &mirror.expect("a mirror"));
@@ -102,7 +102,7 @@ fn a_mirrored_scene_is_the_mirrored_picture() {
 
 #[test]
 fn the_order_of_volumes_and_of_pieces_is_no_matter() {
-    each("permuted", 200, |random| {
+    each("permuted", 60, |random| {
         let case = cases::any(random, Contents { volumes: 4, cut: true, meshes: 0 });
         let mut permuted = case.scene.clone();
         permuted.volumes.reverse();
@@ -120,7 +120,7 @@ fn the_order_of_volumes_and_of_pieces_is_no_matter() {
 
 #[test]
 fn a_clear_volume_and_a_clear_surface_change_nothing() {
-    each("clear things", 100, |random| {
+    each("clear things", 40, |random| {
         let case = cases::any(random, Contents { volumes: 2, cut: true, meshes: 2 });
         let mut more = case.scene.clone();
         let mut extra = cases::any(random, Contents { volumes: 1, cut: false, meshes: 1 }).scene;

@@ -34,7 +34,7 @@ fn check_sized(case: &Case, size: [u32; 2]) -> Result<(), String> {
 
 #[test]
 fn one_volume_of_any_kind_from_anywhere() {
-    each("one volume", 400, |random| {
+    each("one volume", 300, |random| {
         let case = cases::any(random, Contents { volumes: 1, cut: false, meshes: 0 });
         check(random, &case)
     });
@@ -42,7 +42,7 @@ fn one_volume_of_any_kind_from_anywhere() {
 
 #[test]
 fn volumes_cut_by_planes_and_cylinders_of_any_kind() {
-    each("cut volumes", 600, |random| {
+    each("cut volumes", 200, |random| {
         let case = cases::any(random, Contents { volumes: 1, cut: true, meshes: 0 });
         check(random, &case)
     });
@@ -50,7 +50,7 @@ fn volumes_cut_by_planes_and_cylinders_of_any_kind() {
 
 #[test]
 fn several_volumes_cut_and_with_surfaces_in_them() {
-    each("all together", 300, |random| {
+    each("all together", 60, |random| {
         let case = cases::any(random, Contents { volumes: 3, cut: true, meshes: 3 });
         check(random, &case)
     });
@@ -76,7 +76,7 @@ fn surfaces_of_any_kind_without_a_volume() {
 
 #[test]
 fn a_scene_a_kilometre_away_is_the_same_picture() {
-    each("far away", 200, |random| {
+    each("far away", 60, |random| {
         let case = cases::any(random, Contents { volumes: 2, cut: true, meshes: 2 });
         let far = Affine::translation(Vector::from_fn(|_, _| random.one(&[-1e6, 0.0, 1e6])));
         let case = Case { scene: cases::moved(&case.scene, &far), ..case };
@@ -96,7 +96,7 @@ fn a_picture_4096_wide_or_high_is_right_at_both_ends() {
 /// A sheet that lies in the plane of a cut is drawn whole: what is behind it is not before it.
 #[test]
 fn a_surface_in_the_plane_of_a_cut() {
-    each("a surface in a cut", 200, |random| {
+    each("a surface in a cut", 120, |random| {
         let mut case = cases::any(random, Contents { volumes: 1, cut: false, meshes: 0 });
         let Scene { volumes, meshes, .. } = &mut case.scene;
         let at = cases::corners(&volumes[0].grid, &volumes[0].pose);

@@ -51,12 +51,15 @@ impl Table {
             let ([r, g, b], tau) = transfer.classify(value);
             [r * tau, g * tau, b * tau, tau]
         };
+        // The last value is met without rounding: a jump may lie there.
+        let value =
+            |node: usize| if node == NODES { to } else { from + step * node.saturating_sub(1) as f64 };
         // Node 0 lies one step before the first value and node NODES at the last: both go on without end.
         let mut sum = [0.0; 4];
         let mut nodes = Vec::with_capacity(NODES + 1);
         for i in 0..=NODES {
-            let here = at(from + step * i.saturating_sub(1) as f64);
-            let next = if i == 0 || i == NODES { here } else { at(from + step * i as f64) };
+            let here = at(value(i));
+            let next = if i == 0 || i == NODES { here } else { at(value(i + 1)) };
             // A jump at the very first value lies within node 0.
             let here = if i == 0 && low < from { at(low) } else { here };
             let next = if i == 0 { here } else { next };

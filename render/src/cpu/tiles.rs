@@ -19,8 +19,10 @@ pub(super) struct Depths {
     pub(super) shown: usize,
 }
 
-/// Room around a box, so that rounding takes nothing away; mm, and pixels.
+/// Room around a box, so that rounding takes nothing away; pixels.
 const ROOM: f64 = 1e-3;
+/// The same in depth, as a part of the shortest side of a voxel and of the depth itself, which is kept in `f32`.
+const DEEP: f64 = 1e-6;
 
 impl Depths {
     pub(super) fn new(placed: &Placed<'_>, rays: &Rays, size: [u32; 2]) -> Self {
@@ -45,8 +47,9 @@ impl Depths {
                     return None;
                 }
                 let near = corners.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+                let room = DEEP * (placed.voxel_mm + (far - rays.near_mm).abs());
                 let range =
-                    [near.max(0.0) - rays.near_mm - ROOM, far - rays.near_mm + ROOM].map(|z| z as f32);
+                    [near.max(0.0) - rays.near_mm - room, far - rays.near_mm + room].map(|z| z as f32);
                 let mut place = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
                 for corner in &corners {
                     let Some(lens) = rays.lens_of(&corner.coords) else {
