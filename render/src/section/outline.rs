@@ -3,8 +3,9 @@
 use super::Section;
 use crate::volume::{Body, Cutter, Face, Point, Side, Vector};
 
-/// Where a cutter crosses the section's plane within `reach_mm` of the section's centre: polylines in
-/// world mm, those of both borders where there is a kerf. Of a blade it is the outline of what it has
+/// Where a cutter crosses the section's plane within `reach_mm` of the section's centre.
+///
+/// Polylines in world mm: both borders where there is a kerf, and of a blade the outline of what it has
 /// passed. Parallel planes give none.
 pub fn cutter_outline(section: &Section, cutter: &Cutter, reach_mm: f64) -> Vec<Vec<Point>> {
     let (body, _) = cutter.solid(Side::Plus);

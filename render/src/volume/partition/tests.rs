@@ -28,10 +28,11 @@ fn place(numbers: &mut Numbers, round: usize) -> Affine {
         1 => Affine::rotation_about(Point::origin(), numbers.vector(), 1.0),
         _ => Affine::rotation_about(Point::origin(), Vector::z(), std::f64::consts::FRAC_PI_2),
     };
-    let far = if round % 7 == 0 { 1e6 } else { 1.0 };
-    let columns = [Vector::x() * 0.5, Vector::y(), Vector::z() * if round % 5 == 0 { 50.0 } else { 2.0 }];
+    let far = if round.is_multiple_of(7) { 1e6 } else { 1.0 };
+    let columns =
+        [Vector::x() * 0.5, Vector::y(), Vector::z() * if round.is_multiple_of(5) { 50.0 } else { 2.0 }];
     let origin = Point::from(numbers.vector() * far);
-    let origin = if round % 3 == 0 { origin.map(f64::round) } else { origin };
+    let origin = if round.is_multiple_of(3) { origin.map(f64::round) } else { origin };
     turn * Affine::from_columns(columns[0], columns[1], columns[2], origin).expect("columns")
 }
 
