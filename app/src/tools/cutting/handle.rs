@@ -33,7 +33,7 @@ pub struct Handle {
     cutter: Cutter,
     /// The middle.
     pub centre: Point,
-    /// Unit vector: the normal of a plane or blade, the axis of a cylinder, z of a dome.
+    /// Unit vector: the normal of a plane or blade, the axis of a cylinder, any of a dome.
     pub axis: Vector,
     /// Unit vectors across the axis; along width and height of a blade.
     across: [Vector; 2],
@@ -48,7 +48,11 @@ impl Handle {
         let (centre, axis, right, half_mm) = match *cutter.shape() {
             Shape::Plane { point, normal } => (point, normal, None, [disc_mm; 2]),
             Shape::Cylinder { point, axis, radius_mm } => (point, axis, None, [radius_mm; 2]),
-            Shape::Dome { centre, radius_mm } => (centre, Vector::z(), None, [radius_mm; 2]),
+            Shape::Dome { centre, radius_mm } => {
+                // The dot on its wall is seen beside its middle from every side of the body.
+                let (axis, out) = (Vector::new(1.0, -1.0, 0.0), Vector::repeat(1.0));
+                (centre, axis, Some(out), [radius_mm; 2])
+            }
             Shape::Blade { point, normal, right, width_mm, height_mm } => {
                 (point, normal, Some(right), [width_mm / 2.0, height_mm / 2.0])
             }
@@ -103,9 +107,9 @@ impl Handle {
                 lines
             }
             Shape::Dome { .. } => {
-                let [u, v] = self.across;
-                let turned = |axis: Vector, across: [Vector; 2]| Self { axis, across, ..*self }.circle(0.0);
-                vec![self.circle(0.0), turned(v, [u, self.axis]), turned(u, [v, self.axis])]
+                let [x, y, z] = [Vector::x(), Vector::y(), Vector::z()];
+                let about = |across| Self { across, ..*self }.circle(0.0);
+                vec![about([x, y]), about([y, z]), about([z, x])]
             }
         }
     }
@@ -337,7 +341,8 @@ mod tests {
         let made = handle.dragged(Grip::Middle, &at(&handle.centre), &at(&(handle.centre + by)));
         let Shape::Dome { centre, .. } = *made.shape() else { panic!("a dome stays one") };
         assert!((centre - handle.centre - by).norm() < 1e-6, "with the pointer: {centre}");
-        assert!(handle.lines().iter().flatten().all(|p| ((p - handle.centre).norm() - 20.0).abs() < 1e-9));
+        let on_it = |p: &Point| ((p - handle.centre).norm() - 20.0).abs() < 1e-9;
+        assert!(handle.lines().iter().flatten().all(on_it), "drawn where it is");
     }
 
     #[test]
