@@ -435,7 +435,7 @@ fn a_section_shows_volumes_labels_and_the_lines_of_moved_fragments() {
     let case = json!({
         "osteotome": 1, "name": "sections",
         "volumes": [{"id": "v", "source": "ramp.nrrd", "transfer": transfer}],
-        "cutters": [{"id": "c", "plane": {"point": [39, 0, 0], "normal": [1, 0, 0]}}],
+        "cutters": [{"id": "c", "plane": {"point": [39.5, 0, 0], "normal": [1, 0, 0]}}],
         "fragments": [{"id": "l", "volume": "v", "keep": {"c": "-"}},
             {"id": "r", "volume": "v", "keep": {"c": "+"}, "pose": [1,0,0,40, 0,1,0,0, 0,0,1,0, 0,0,0,1]}],
         "labels": [{"id": "s", "volume": "v", "source": "labels.nrrd", "colors": {"1": [1, 0, 0, 1]}}]

@@ -84,6 +84,7 @@ fn rules() -> Vec<Rule> {
                 "app/src/case/",
                 "app/src/headless/",
                 "app/src/scene",
+                "app/src/sections",
                 "app/src/jobs",
                 "app/src/sample/",
                 "app/src/save/",

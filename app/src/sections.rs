@@ -55,14 +55,16 @@ pub fn piece_at(case: &Case, assets: &Assets, volume: &Volume, p: &Point) -> Opt
     layer.pieces.into_iter().nth(index)
 }
 
-/// The cutters' lines in a section, world mm: of a cutter that fragments keep a side of, its line at each shown
-/// one's place, as far as it bounds that fragment; of one that cuts nothing yet, its whole line within `reach_mm`.
+/// The cutters' lines in a section; world mm.
+///
+/// Of a cutter that fragments keep a side of: its line at each shown one's place, as far as it bounds that fragment.
+/// Of one that cuts nothing yet: its whole line within `reach_mm`.
 pub fn cutter_lines(case: &Case, layers: &[Layer], section: &Section, reach_mm: f64) -> Vec<Vec<Point>> {
     let used = |id: &str| case.fragments.iter().any(|f| f.keep.contains_key(id));
     let idle = case.cutters.iter().filter(|c| !used(&c.id));
     let whole = idle.flat_map(|c| section::cutter_outline(section, &c.cutter, reach_mm));
     let bounds = layers.iter().flat_map(|layer| {
-        let of_piece = |piece: &Piece| section::piece_outlines(section, &layer.grid, &layer.pose, piece);
+        let of_piece = move |piece: &Piece| section::piece_outlines(section, &layer.grid, &layer.pose, piece);
         layer.pieces.iter().flat_map(of_piece).map(|line| line.places)
     });
     whole.chain(bounds).collect()

@@ -162,7 +162,7 @@ fn repainted(
         });
     }
     counts.retain(|label, count| *label > 0 && *count > 0);
-    let small = changed.iter().all(|(_, brick)| brick.iter().all(|&label| label <= u16::from(u8::MAX)));
+    let small = changed.iter().all(|(_, brick)| brick.iter().all(|&label| u8::try_from(label).is_ok()));
     let plain = grid.rescale() == Rescale::default();
     let samples = match grid.samples() {
         Samples::U8(v) if small && plain => {

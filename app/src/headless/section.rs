@@ -87,7 +87,9 @@ fn fit(section: &Section, [low, high]: [Point; 2]) -> f64 {
 /// Cutters and implants over the picture.
 fn lines(input: &input::Input, layers: &[Layer], section: &Section, reach_mm: f64, bytes: &mut [u8]) {
     for line in sections::cutter_lines(&input.case, layers, section, reach_mm) {
-        line.windows(2).for_each(|pair| stroke(section, [pair[0], pair[1]], CUTTER, bytes));
+        for pair in line.windows(2) {
+            stroke(section, [pair[0], pair[1]], CUTTER, bytes);
+        }
     }
     for implant in input.case.implants.iter().filter(|i| i.visible) {
         let Some(mesh) = input.assets.mesh(implant) else { continue };

@@ -28,6 +28,7 @@ pub mod session;
 pub mod spatial_view;
 pub mod status;
 pub mod tool;
+mod turning;
 pub mod viewport;
 pub mod views;
 

@@ -38,6 +38,7 @@ pub enum LabelsError {
 pub type Saved = BTreeMap<String, (Arc<Bricks>, PathBuf)>;
 
 /// Writes every painted set into a new NRRD file beside `path`, the case's file, and gives the case that names them.
+///
 /// A set whose paint is as it was saved last, in this folder, keeps its file.
 ///
 /// # Errors

@@ -23,8 +23,10 @@ impl Stroke {
         Self { piece, pose, at, changed: Bricks::new() }
     }
 
-    /// Paints from where it is to a world place: the bricks that this changed. Labels are painted whose centre is
-    /// in a ball about a point of the way, `radius_mm` or nearest to it, and in the piece; 0 erases.
+    /// Paints from where it is to a world place: the bricks that this changed.
+    ///
+    /// Labels are painted whose centre is within `radius_mm` of a point of the way, or nearest to it, and in the
+    /// piece; 0 erases.
     pub(super) fn to(&mut self, labels: &LabelGrid, place: Point, radius_mm: f64, label: u16) -> Bricks {
         let along = place - self.at;
         let steps = (along.norm() / (0.5 * radius_mm).max(0.05)).ceil().clamp(1.0, 2000.0) as usize;
@@ -172,11 +174,11 @@ mod tests {
             edit::apply(case, Edit::ChangeLabels { id: "l".to_owned(), change }).expect("painted");
         };
         let (grids, base) = (LabelGrids::default(), empty().grid);
-        let known = grids.grid(&case.labels[0], &base);
-        paint(&mut case, Point::new(8.0, 8.0, 8.0), &known);
+        let labels = grids.grid(&case.labels[0], &base);
+        paint(&mut case, Point::new(8.0, 8.0, 8.0), &labels);
         let before = case.clone();
-        let known = grids.grid(&case.labels[0], &base);
-        paint(&mut case, Point::new(24.0, 8.0, 8.0), &known);
+        let labels = grids.grid(&case.labels[0], &base);
+        paint(&mut case, Point::new(24.0, 8.0, 8.0), &labels);
         assert_ne!(before, case, "a change");
         let (old, new) = (&before.labels[0].painted, &case.labels[0].painted);
         assert_eq!((old.len(), new.len()), (1, 2), "one brick more");
