@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use render::scene::{Camera, Piece, Projection, Scene, Shading, TextureFormat, VolumeItem, VolumeMode};
-use render::volume::{Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Transfer, Vector};
+use render::volume::{Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Shape, Transfer, Vector};
 
 use super::parts::{self, Corners};
 use super::random::Random;
@@ -183,8 +183,8 @@ fn camera(random: &mut Random, volumes: &[VolumeItem], size: f64) -> Camera {
         // On a face.
         1 => at[0] + (at[1] - at[0]) * random.part() + (at[2] - at[0]) * random.part(),
         // On a plane that cuts.
-        2 => match first.pieces.first().and_then(|p| p.keep.first()) {
-            Some((Cutter::Plane { point, .. }, _)) => *point,
+        2 => match first.pieces.first().and_then(|p| p.keep.first()).map(|(cutter, _)| *cutter.shape()) {
+            Some(Shape::Plane { point, .. }) => point,
             _ => at[7],
         },
         _ => target + away * (size * random.power(0.1, 1.0)),
@@ -212,14 +212,13 @@ fn camera(random: &mut Random, volumes: &[VolumeItem], size: f64) -> Camera {
 /// All of a scene moved alike; `by` may mirror.
 pub(super) fn moved(scene: &Scene, by: &Affine) -> Scene {
     let mut scene = scene.clone();
-    let cutter = |cutter: &Cutter| match *cutter {
-        Cutter::Plane { point, normal } => {
-            Cutter::Plane { point: by.point(&point), normal: by.normal(&normal) }
+    let cutter = |cutter: &Cutter| match *cutter.shape() {
+        // A normal, since `by` may mirror.
+        Shape::Plane { point, normal } => {
+            let shape = Shape::Plane { point: by.point(&point), normal: by.normal(&normal) };
+            Cutter::new(shape, cutter.kerf_mm()).expect("finite numbers")
         }
-        Cutter::Cylinder { point, axis, radius_mm } => {
-            Cutter::Cylinder { point: by.point(&point), axis: by.vector(&axis), radius_mm }
-        }
-        ref other => *other,
+        _ => cutter.moved(by),
     };
     for volume in &mut scene.volumes {
         volume.pose = *by * volume.pose;

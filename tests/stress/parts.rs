@@ -35,7 +35,7 @@ pub(super) fn cutters(random: &mut Random, corners: &Corners, size: f64) -> Vec<
     let other = if side == Side::Plus { Side::Minus } else { Side::Plus };
     let edge = corners[1] - corners[0];
     let plane = |point: Point, normal: Vector| Cutter::plane(point, normal).expect("finite numbers");
-    match random.below(9) {
+    match random.below(11) {
         // Through a corner.
         0 => vec![(plane(corners[random.below(8)], normal), side)],
         // Through an edge, turned about it; where the turn is nought, grazing a face.
@@ -66,6 +66,16 @@ pub(super) fn cutters(random: &mut Random, corners: &Corners, size: f64) -> Vec<
             let radius = size * random.power(-2.0, 0.5);
             let tube = Cutter::cylinder(inside, normal, radius).expect("a radius");
             vec![(tube, side)]
+        }
+        7 => {
+            let dome = Cutter::dome(inside, size * random.power(-2.0, 0.3)).expect("a radius");
+            vec![(dome, side)]
+        }
+        8 => {
+            let right = normal.cross(&(edge + random.direction() * size));
+            let extent = [0, 1].map(|_| size * random.power(-2.0, 0.3));
+            // A direction along the normal gives no blade.
+            Cutter::blade(inside, normal, right, extent).map(|blade| vec![(blade, side)]).unwrap_or_default()
         }
         _ => vec![(plane(inside, normal), side)],
     }
