@@ -181,7 +181,17 @@ fn every_texture_draws_and_the_lossy_ones_say_so() {
         case["volumes"][0]["texture"] = json!(texture);
         let path = cases::write_case(folder.path(), &case);
         let picture = folder.path().join(format!("{texture}.png"));
-        let args = ["render", text(&path), "--out", text(&picture), "--size", "96x72", "--stats"];
+        let args = [
+            "render",
+            text(&path),
+            "--out",
+            text(&picture),
+            "--size",
+            "96x72",
+            "--stats",
+            "--backend",
+            "gpu",
+        ];
         let stats = osteotome(&args).json();
         let drawn = open_rgb(&picture);
         let textures = stats["textures"].as_array().unwrap_or_else(|| panic!("{texture}: {stats}"));

@@ -133,7 +133,8 @@ mod tests {
         let rod = painted(&stroke.to(&empty(), to, 6.0, 3)).len() as f64;
         let known = std::f64::consts::PI * 36.0 * (16.0 + 4.0 / 3.0 * 6.0);
         assert!((rod - known).abs() < 0.06 * known, "{rod} samples, {known} mm³");
-        let erased = stroke.to(&empty(), from, 9.0, 0);
+        let mut erased = stroke.to(&empty(), to, 9.0, 0);
+        erased.extend(stroke.to(&empty(), from, 9.0, 0));
         assert!(painted(&erased).is_empty(), "a wider rubber leaves nothing of it");
     }
 

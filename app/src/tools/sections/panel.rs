@@ -67,7 +67,7 @@ fn slab_ui(ui: &mut Ui, slab: &mut Slab) {
         SlabMode::Mip => "MIP",
         SlabMode::MinIp => "MinIP",
     };
-    ComboBox::from_id_salt("mode").width(70.0).selected_text(name(slab.mode)).show_ui(ui, |ui| {
+    ComboBox::from_label("is shown").width(70.0).selected_text(name(slab.mode)).show_ui(ui, |ui| {
         for mode in [SlabMode::Mean, SlabMode::Mip, SlabMode::MinIp] {
             ui.selectable_value(&mut slab.mode, mode, name(mode));
         }
