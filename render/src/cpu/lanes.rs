@@ -1,13 +1,13 @@
 //! Eight numbers at once, by AVX2: what packets of rays are made of.
 
 use std::arch::x86_64::{
-    __m256, __m256i, _CMP_LT_OQ, _MM_FROUND_NO_EXC, _MM_FROUND_TO_NEAREST_INT, _mm256_add_epi32,
-    _mm256_add_ps, _mm256_and_si256, _mm256_blendv_epi8, _mm256_blendv_ps, _mm256_castps_si256,
-    _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cvtepi32_ps, _mm256_cvttps_epi32, _mm256_div_ps,
-    _mm256_mask_i32gather_epi32, _mm256_mask_i32gather_ps, _mm256_max_epi32, _mm256_min_epi32,
+    __m128, __m256, __m256d, __m256i, _CMP_LT_OQ, _MM_FROUND_NO_EXC, _MM_FROUND_TO_NEAREST_INT, _mm_setr_ps,
+    _mm_storeu_ps, _mm256_add_epi32, _mm256_add_ps, _mm256_and_si256, _mm256_blendv_epi8, _mm256_blendv_ps,
+    _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cvtepi32_ps, _mm256_cvttps_epi32,
+    _mm256_div_ps, _mm256_mask_i32gather_epi32, _mm256_mask_i32gather_ps, _mm256_max_epi32, _mm256_min_epi32,
     _mm256_min_epu32, _mm256_min_ps, _mm256_mul_ps, _mm256_round_ps, _mm256_set1_epi32, _mm256_set1_ps,
-    _mm256_setr_ps, _mm256_setzero_ps, _mm256_setzero_si256, _mm256_slli_epi32, _mm256_srai_epi32,
-    _mm256_storeu_ps, _mm256_sub_epi32, _mm256_sub_ps,
+    _mm256_setr_pd, _mm256_setr_ps, _mm256_setzero_ps, _mm256_setzero_si256, _mm256_slli_epi32,
+    _mm256_srai_epi32, _mm256_storeu_ps, _mm256_storeu_si256, _mm256_sub_epi32, _mm256_sub_ps,
 };
 
 use super::field::Values;
@@ -34,6 +34,42 @@ pub(super) fn store(v: Floats) -> [f32; LANES] {
         _mm256_storeu_ps(out.as_mut_ptr(), v);
     }
     out
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn store_whole(v: Wholes) -> [i32; LANES] {
+    let mut out = [0; LANES];
+    #[expect(unsafe_code, reason = "a store of eight lanes")]
+    // SAFETY: the array has room for exactly eight numbers, and the store asks for no alignment.
+    unsafe {
+        _mm256_storeu_si256(out.as_mut_ptr().cast(), v);
+    }
+    out
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn store_four(v: __m128) -> [f32; 4] {
+    let mut out = [0.0; 4];
+    #[expect(unsafe_code, reason = "a store of four lanes")]
+    // SAFETY: the array has room for exactly four floats, and the store asks for no alignment.
+    unsafe {
+        _mm_storeu_ps(out.as_mut_ptr(), v);
+    }
+    out
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn four(v: &[f32; 4]) -> __m128 {
+    _mm_setr_ps(v[0], v[1], v[2], v[3])
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn four_wide(v: &[f64; 4]) -> __m256d {
+    _mm256_setr_pd(v[0], v[1], v[2], v[3])
 }
 
 #[inline]

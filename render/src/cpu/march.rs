@@ -7,24 +7,18 @@ use super::walker::{Ray, Walker};
 
 /// What has come through so far.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Light {
+struct Light {
     color: [f32; 3],
-    pub(super) through: f32,
+    through: f32,
 }
 
 impl Light {
-    pub(super) const START: Self = Self { color: [0.0; 3], through: 1.0 };
+    const START: Self = Self { color: [0.0; 3], through: 1.0 };
 
     /// Passes what has this optical depth times colour, and optical depth.
     #[inline(always)]
     fn absorb(&mut self, [r, g, b, depth]: [f32; 4]) {
         let (left, weight) = absorbed(depth);
-        self.absorb_by([r, g, b, depth], left, weight);
-    }
-
-    /// The same, with what [`absorbed`] says of the optical depth.
-    #[inline(always)]
-    pub(super) fn absorb_by(&mut self, [r, g, b, _]: [f32; 4], left: f32, weight: f32) {
         let weight = weight * self.through;
         self.color = [self.color[0] + r * weight, self.color[1] + g * weight, self.color[2] + b * weight];
         self.through *= left;
@@ -38,7 +32,7 @@ impl Light {
         self.through *= 1.0 - hit.opacity;
     }
 
-    pub(super) fn pixel(self) -> [f32; 4] {
+    fn pixel(self) -> [f32; 4] {
         let [r, g, b] = self.color;
         [r, g, b, 1.0 - self.through]
     }

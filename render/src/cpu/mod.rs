@@ -235,13 +235,12 @@ impl CpuRenderer {
         Ok((FloatImage { width, height, pixels }, stats))
     }
 
+    /// What may be left out behind a pixel falls with the error of the steps, which goes with their square.
     fn dark(&self, quality: Quality) -> f32 {
-        match quality {
-            _ if !self.skips.finished => 0.0,
-            Quality::Draft => 1.0 / 512.0,
-            Quality::Good => 1.0 / 1024.0,
-            _ => 1.0 / 65536.0,
+        if !self.skips.finished {
+            return 0.0;
         }
+        (quality.voxels().powi(2) / 1024.0).clamp(1.0 / 65536.0, 1.0 / 512.0) as f32
     }
 
     /// Makes ready what is not, lets go of what the scene does not show. For each volume of the scene its place among
@@ -384,10 +383,7 @@ impl Picture<'_> {
                 lanes.rays[lane] = self.ray(*lens);
                 [lanes.from[lane], lanes.to[lane]] = piece.stretch(*lens, depths).unwrap_or_default();
             }
-            let lights = packet::march(piece, &lanes, self.manner, work);
-            for (pixel, light) in pixels.iter_mut().zip(lights) {
-                *pixel = light.pixel();
-            }
+            pixels.copy_from_slice(&packet::march(piece, &lanes, self.manner, work));
             true
         })
     }

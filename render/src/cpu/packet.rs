@@ -4,20 +4,24 @@
 //! absorbs is a lane looked at by itself, since the table's nodes lie apart.
 
 use std::arch::x86_64::{
-    _CMP_EQ_OQ, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_epi32, _mm256_add_ps, _mm256_and_ps,
-    _mm256_and_si256, _mm256_andnot_ps, _mm256_castsi256_ps, _mm256_ceil_ps, _mm256_cmp_ps,
-    _mm256_cmpgt_epi32, _mm256_cvtepi32_ps, _mm256_cvttps_epi32, _mm256_div_ps, _mm256_floor_ps,
-    _mm256_max_epi32, _mm256_max_ps, _mm256_min_epi32, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps,
-    _mm256_mullo_epi32, _mm256_or_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps,
-    _mm256_setzero_si256, _mm256_srai_epi32, _mm256_sub_epi32, _mm256_sub_ps,
+    __m128, __m256d, _CMP_EQ_OQ, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _mm_add_ps, _mm_mul_ps, _mm_set1_ps,
+    _mm_setzero_ps, _mm256_add_epi32, _mm256_add_pd, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256,
+    _mm256_andnot_ps, _mm256_castsi256_ps, _mm256_ceil_ps, _mm256_cmp_ps, _mm256_cmpgt_epi32,
+    _mm256_cvtepi32_ps, _mm256_cvtpd_ps, _mm256_cvtps_pd, _mm256_cvttps_epi32, _mm256_div_ps,
+    _mm256_floor_ps, _mm256_max_epi32, _mm256_max_ps, _mm256_min_epi32, _mm256_min_ps, _mm256_movemask_ps,
+    _mm256_mul_ps, _mm256_mullo_epi32, _mm256_or_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_pd,
+    _mm256_setzero_ps, _mm256_setzero_si256, _mm256_srai_epi32, _mm256_sub_epi32, _mm256_sub_pd,
+    _mm256_sub_ps,
 };
 
 use super::field::EDGE;
 use super::lanes::{
-    Floats, Wholes, absorbed, as_mask, bytes_at, clamp_whole, load, pairs_at, select, select_whole, store,
+    Floats, Wholes, absorbed, as_mask, bytes_at, clamp_whole, four, four_wide, load, pairs_at, select,
+    select_whole, store, store_four, store_whole,
 };
-use super::march::{Light, Manner, Work};
+use super::march::{Manner, Work};
 use super::piece::Placed;
+use super::table::{EVEN, Table};
 use super::walker::Ray;
 
 /// Rays of a packet.
@@ -150,6 +154,40 @@ impl Cells {
     }
 }
 
+/// Where table positions lie among the nodes.
+struct Places {
+    position: [f32; LANES],
+    node: [i32; LANES],
+    part: [f32; LANES],
+}
+
+impl Places {
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn new(table: &Table, position: Floats) -> Self {
+        let last = _mm256_set1_epi32(table.nodes().len() as i32 - 1);
+        let node = _mm256_cvttps_epi32(_mm256_max_ps(position, _mm256_setzero_ps()));
+        let node = _mm256_min_epi32(node, last);
+        let part = _mm256_sub_ps(position, _mm256_cvtepi32_ps(node));
+        Self { position: store(position), node: store_whole(node), part: store(part) }
+    }
+
+    /// [`Table::sum`] in a lane.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn sum(&self, table: &Table, lane: usize) -> __m256d {
+        let nodes = table.nodes();
+        let node = &nodes[(self.node[lane] as usize).min(nodes.len() - 1)];
+        if node.half_rise[3].is_nan() {
+            return four_wide(&table.sum(self.position[lane]));
+        }
+        let part = _mm_set1_ps(self.part[lane]);
+        let rise = _mm_mul_ps(part, four(&node.half_rise));
+        let inner = _mm_mul_ps(part, _mm_add_ps(four(&node.from), rise));
+        _mm256_add_pd(four_wide(&node.sum), _mm256_cvtps_pd(inner))
+    }
+}
+
 /// What a piece needs so that packets may go through it: indices of 32 bits and pairs along x.
 pub(super) fn suits(piece: &Placed<'_>) -> bool {
     let field = piece.volume.field;
@@ -170,9 +208,11 @@ struct Packet<'a> {
     position: Floats,
     known: Floats,
     /// The antiderivative there, and the lanes in which it is known, as bits.
-    sums: [[f64; 4]; LANES],
+    sums: [__m256d; LANES],
     sums_known: u32,
-    light: [Light; LANES],
+    /// Red, green and blue so far, and what still comes through.
+    colors: [__m128; LANES],
+    through: Floats,
     /// Lanes that go on.
     active: Floats,
 }
@@ -186,9 +226,9 @@ struct Ahead {
     exit: Floats,
 }
 
-/// The light of each ray through a piece that [`suits`].
+/// The pixel of each ray through a piece that [`suits`].
 #[target_feature(enable = "avx2")]
-pub(super) fn march(piece: &Placed<'_>, lanes: &Lanes, manner: Manner, work: &mut Work) -> [Light; LANES] {
+pub(super) fn march(piece: &Placed<'_>, lanes: &Lanes, manner: Manner, work: &mut Work) -> [[f32; 4]; LANES] {
     let to = load(&lanes.to);
     let mut at = load(&lanes.from);
     let mut packet = Packet::new(piece, lanes, manner);
@@ -207,7 +247,13 @@ pub(super) fn march(piece: &Placed<'_>, lanes: &Lanes, manner: Manner, work: &mu
         packet.active = _mm256_and_ps(packet.active, _mm256_cmp_ps::<_CMP_LT_OQ>(ahead.exit, to));
         packet.advance(&ahead);
     }
-    packet.light
+    let through = store(packet.through);
+    let mut pixels = [[0.0; 4]; LANES];
+    for (lane, pixel) in pixels.iter_mut().enumerate() {
+        *pixel = store_four(packet.colors[lane]);
+        pixel[3] = 1.0 - through[lane];
+    }
+    pixels
 }
 
 impl<'a> Packet<'a> {
@@ -238,9 +284,10 @@ impl<'a> Packet<'a> {
             cell,
             position: _mm256_setzero_ps(),
             known: _mm256_setzero_ps(),
-            sums: [[0.0; 4]; LANES],
+            sums: [_mm256_setzero_pd(); LANES],
             sums_known: 0,
-            light: [Light::START; LANES],
+            colors: [_mm_setzero_ps(); LANES],
+            through: _mm256_set1_ps(1.0),
             active: _mm256_cmp_ps::<_CMP_LT_OQ>(at, load(&lanes.to)),
         }
     }
@@ -321,11 +368,7 @@ impl<'a> Packet<'a> {
             self.sums_known &= lit | !(_mm256_movemask_ps(stepping) as u32);
             if lit != 0 {
                 self.absorb(lit, [before, here], reached);
-                let mut through = [0.0; LANES];
-                for (through, light) in through.iter_mut().zip(&self.light) {
-                    *through = light.through;
-                }
-                let dark = _mm256_cmp_ps::<_CMP_LT_OQ>(load(&through), _mm256_set1_ps(self.manner.dark));
+                let dark = _mm256_cmp_ps::<_CMP_LT_OQ>(self.through, _mm256_set1_ps(self.manner.dark));
                 let done = _mm256_and_ps(dark, stepping);
                 work.finished += u64::from((_mm256_movemask_ps(done) as u32).count_ones());
                 stepping = _mm256_andnot_ps(done, stepping);
@@ -341,40 +384,69 @@ impl<'a> Packet<'a> {
     #[target_feature(enable = "avx2")]
     fn absorb(&mut self, lit: u32, [before, here]: [Floats; 2], reached: Floats) {
         let table = self.piece.volume.table;
-        let (befores, heres) = (store(self.position), store(reached));
-        let mms = store(_mm256_mul_ps(_mm256_sub_ps(here, before), self.mm_per_zeta));
-        let middles = store(_mm256_mul_ps(_mm256_set1_ps(0.5), _mm256_add_ps(before, here)));
-        let mut depths = [[0.0_f32; 4]; LANES];
+        let mm = _mm256_mul_ps(_mm256_sub_ps(here, before), self.mm_per_zeta);
+        let rise = _mm256_sub_ps(reached, self.position);
+        let size = _mm256_andnot_ps(_mm256_set1_ps(-0.0), rise);
+        let rises = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(size, _mm256_set1_ps(EVEN))) as u32;
+        let by = store(_mm256_div_ps(mm, rise));
+        let at_begin = Places::new(table, self.position);
+        let at_end = Places::new(table, reached);
+        let mut depths = [_mm_setzero_ps(); LANES];
         let mut optical = [0.0_f32; LANES];
         let mut left = lit;
         while left != 0 {
             let lane = left.trailing_zeros() as usize % LANES;
             left &= left - 1;
-            let (a, b) = (befores[lane], heres[lane]);
-            let sum_a = if self.sums_known >> lane & 1 == 1 { self.sums[lane] } else { table.sum(a) };
-            self.sums[lane] = table.sum(b);
-            let mut depth = table.depth([a, b], [&sum_a, &self.sums[lane]], mms[lane]);
-            if depth[3] > 0.0 && self.piece.lit {
-                let (start, growth) = self.piece.voxel_line(self.lanes.lens[lane]);
-                let mut place = [0.0_f32; 3];
-                for axis in 0..3 {
-                    place[axis] = start[axis] as f32 + growth[axis] as f32 * middles[lane];
-                }
-                self.piece.light(&mut depth, place, self.lanes.rays[lane].direction);
-            }
+            let begin =
+                if self.sums_known >> lane & 1 == 1 { self.sums[lane] } else { at_begin.sum(table, lane) };
+            let end = at_end.sum(table, lane);
+            self.sums[lane] = end;
+            let depth = if rises >> lane & 1 == 1 {
+                _mm_mul_ps(_mm256_cvtpd_ps(_mm256_sub_pd(end, begin)), _mm_set1_ps(by[lane]))
+            } else {
+                let middle = 0.5 * (at_begin.position[lane] + at_end.position[lane]);
+                four(&table.even(middle, store(mm)[lane]))
+            };
             depths[lane] = depth;
-            optical[lane] = depth[3];
+            optical[lane] = store_four(depth)[3];
         }
         self.sums_known |= lit;
-        let (through, weight) = absorbed(load(&optical));
-        let (through, weight) = (store(through), store(weight));
-        let mut left = lit;
+        if self.piece.lit {
+            self.light(lit, [before, here], &mut depths, &optical);
+        }
+        let optical = load(&optical);
+        let (through, weight) = absorbed(optical);
+        let absorbs = _mm256_cmp_ps::<_CMP_GT_OQ>(optical, _mm256_setzero_ps());
+        let weight = store(_mm256_mul_ps(weight, self.through));
+        let mut left = lit & _mm256_movemask_ps(absorbs) as u32;
         while left != 0 {
             let lane = left.trailing_zeros() as usize % LANES;
             left &= left - 1;
-            if optical[lane] > 0.0 {
-                self.light[lane].absorb_by(depths[lane], through[lane], weight[lane]);
+            let more = _mm_mul_ps(depths[lane], _mm_set1_ps(weight[lane]));
+            self.colors[lane] = _mm_add_ps(self.colors[lane], more);
+        }
+        self.through = select(absorbs, _mm256_mul_ps(self.through, through), self.through);
+    }
+
+    /// Lights the steps by their middles.
+    #[target_feature(enable = "avx2")]
+    fn light(
+        &self,
+        lit: u32,
+        [before, here]: [Floats; 2],
+        depths: &mut [__m128; LANES],
+        optical: &[f32; LANES],
+    ) {
+        let middles = store(_mm256_mul_ps(_mm256_set1_ps(0.5), _mm256_add_ps(before, here)));
+        for lane in (0..LANES).filter(|lane| lit >> lane & 1 == 1 && optical[*lane] > 0.0) {
+            let (start, growth) = self.piece.voxel_line(self.lanes.lens[lane]);
+            let mut place = [0.0_f32; 3];
+            for axis in 0..3 {
+                place[axis] = start[axis] as f32 + growth[axis] as f32 * middles[lane];
             }
+            let mut depth = store_four(depths[lane]);
+            self.piece.light(&mut depth, place, self.lanes.rays[lane].direction);
+            depths[lane] = four(&depth);
         }
     }
 

@@ -10,15 +10,18 @@ use crate::volume::{Grid, Transfer};
 /// Nodes over the values that occur.
 const NODES: usize = 2048;
 
+/// Positions nearer than this count as one: their quotient would have lost its digits.
+pub(super) const EVEN: f32 = 1e-2;
+
 /// Extinction from one node to the next, where it is linear: (τ·red, τ·green, τ·blue, τ), 1/mm. One line of cache.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
-struct Node {
+pub(super) struct Node {
     /// Antiderivative at the node.
-    sum: [f64; 4],
-    from: [f32; 4],
-    /// Half of the rise to the next node.
-    half_rise: [f32; 4],
+    pub(super) sum: [f64; 4],
+    pub(super) from: [f32; 4],
+    /// Half of the rise to the next node; not a number where there are jumps before that.
+    pub(super) half_rise: [f32; 4],
 }
 
 /// A node within which extinction jumps: what it is between the jumps, linear in each part.
@@ -197,8 +200,7 @@ impl Table {
     #[inline(always)]
     pub(super) fn depth(&self, [a, b]: [f32; 2], [sum_a, sum_b]: [&[f64; 4]; 2], mm: f32) -> [f32; 4] {
         let rise = b - a;
-        // Nearer than this the quotient has lost its digits, and extinction is one all along.
-        if rise.abs() > 1e-2 {
+        if rise.abs() > EVEN {
             let by = mm / rise;
             let mut depth = [0.0; 4];
             for c in 0..4 {
@@ -206,11 +208,20 @@ impl Table {
             }
             return depth;
         }
-        let mut depth = self.rate(0.5 * (a + b));
+        self.even(0.5 * (a + b), mm)
+    }
+
+    /// The same where the position stays.
+    pub(super) fn even(&self, position: f32, mm: f32) -> [f32; 4] {
+        let mut depth = self.rate(position);
         for d in &mut depth {
             *d *= mm;
         }
         depth
+    }
+
+    pub(super) fn nodes(&self) -> &[Node] {
+        &self.nodes
     }
 }
 
