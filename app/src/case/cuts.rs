@@ -2,7 +2,7 @@
 //!
 //! A cutter acts on the surface in its place; the cut is made in the model's own frame, so that vertices it
 //! does not touch stay as they are. Round cutters become facets within
-//! [`DEFAULT_SAGITTA_MM`](render::volume::cut::DEFAULT_SAGITTA_MM) of their wall.
+//! [`DEFAULT_SAGITTA_MM`] of their wall.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};

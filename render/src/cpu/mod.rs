@@ -115,6 +115,9 @@ fn has_wide() -> bool {
     false
 }
 
+/// Pixels that may go at once, across and down.
+const BLOCK: [usize; 2] = [4, 2];
+
 /// A volume's samples made ready, and what transfer functions make of them.
 #[derive(Debug)]
 struct Kept {
@@ -367,41 +370,41 @@ impl Picture<'_> {
             // SAFETY: they were detected.
             return unsafe { self.band_avx2(band, rows, scratch) };
         }
-        self.tiles(band, rows, scratch, &|_, _, _, _, _| false)
+        self.tiles(band, rows, scratch, &|_, _, _, _| None)
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
     fn band_avx2(&self, band: usize, rows: &mut [[f32; 4]], scratch: &mut Scratch) -> (Work, u64) {
-        self.tiles(band, rows, scratch, &|piece, depths, at, pixels, work| {
+        self.tiles(band, rows, scratch, &|piece, depths, [x, y], work| {
             if !packet::suits(piece) {
-                return false;
+                return None;
             }
             let mut lanes = packet::Lanes::default();
             for (lane, lens) in lanes.lens.iter_mut().enumerate() {
-                *lens = self.rays.lens(at[0] + lane, at[1]);
+                *lens = self.rays.lens(x + lane % BLOCK[0], y + lane / BLOCK[0]);
                 lanes.rays[lane] = self.ray(*lens);
                 [lanes.from[lane], lanes.to[lane]] = piece.stretch(*lens, depths).unwrap_or_default();
             }
-            pixels.copy_from_slice(&packet::march(piece, &lanes, self.manner, work));
-            true
+            Some(packet::march(piece, &lanes, self.manner, work))
         })
     }
 
-    /// All tiles of a row. `eight` is asked first for the rays of eight pixels that see nothing but one piece, and says
-    /// whether it drew them.
+    /// All tiles of a row, block by block. `eight` is asked first for the pixels of a block whose rays see nothing but
+    /// one piece; it may leave them to the rays one by one.
     #[inline(always)]
     fn tiles(
         &self,
         band: usize,
         rows: &mut [[f32; 4]],
         scratch: &mut Scratch,
-        eight: &impl Fn(&Placed<'_>, [f32; 2], [usize; 2], &mut [[f32; 4]], &mut Work) -> bool,
+        eight: &impl Fn(&Placed<'_>, [f32; 2], [usize; 2], &mut Work) -> Option<[[f32; 4]; 8]>,
     ) -> (Work, u64) {
         let mut work = Work::default();
         let [width, height] = self.size.map(|n| n as usize);
         let crossings = self.surfaces.band(band, &self.rays, width, height);
         let mut shown = Vec::with_capacity(self.placed.len());
+        let tall = rows.len() / width;
         for tile in 0..width.div_ceil(TILE) {
             shown.clear();
             for (piece, depths) in self.placed.iter().zip(self.depths) {
@@ -413,32 +416,38 @@ impl Picture<'_> {
             if shown.is_empty() && self.layered.is_empty() && crossings.len() == 0 {
                 continue;
             }
-            for (row, line) in rows.chunks_exact_mut(width).enumerate() {
-                let columns = tile * TILE..((tile + 1) * TILE).min(width);
-                let y = band * TILE + row;
-                if let ([(piece, depths)], []) = (&shown[..], self.layered)
-                    && columns.len() == TILE
-                    && columns.clone().all(|x| crossings.of(row * width + x).is_empty())
-                    && eight(piece, *depths, [columns.start, y], &mut line[columns.clone()], &mut work)
-                {
+            for block in 0..TILE * TILE / 8 {
+                let across = TILE / BLOCK[0];
+                let (left, top) = (tile * TILE + block % across * BLOCK[0], block / across * BLOCK[1]);
+                let (right, bottom) = ((left + BLOCK[0]).min(width), (top + BLOCK[1]).min(tall));
+                if left >= right || top >= bottom {
                     continue;
                 }
-                for (x, pixel) in columns.clone().zip(&mut line[columns]) {
-                    let hits = crossings.of(row * width + x);
+                let is_whole = right - left == BLOCK[0] && bottom - top == BLOCK[1];
+                let places = (top..bottom).flat_map(|row| (left..right).map(move |x| row * width + x));
+                let drawn = match (&shown[..], self.layered) {
+                    ([(piece, depths)], [])
+                        if is_whole && places.clone().all(|place| crossings.of(place).is_empty()) =>
+                    {
+                        eight(piece, *depths, [left, band * TILE + top], &mut work)
+                    }
+                    _ => None,
+                };
+                if let Some(pixels) = drawn {
+                    for (place, pixel) in places.zip(pixels) {
+                        rows[place] = pixel;
+                    }
+                    continue;
+                }
+                for place in places {
+                    let hits = crossings.of(place);
                     if shown.is_empty() && self.layered.is_empty() && hits.is_empty() {
                         continue;
                     }
-                    let lens = self.rays.lens(x, y);
-                    *pixel = march::pixel(
-                        &shown,
-                        self.layered,
-                        hits,
-                        lens,
-                        &self.ray(lens),
-                        self.manner,
-                        scratch,
-                        &mut work,
-                    );
+                    let lens = self.rays.lens(place % width, band * TILE + place / width);
+                    let ray = self.ray(lens);
+                    rows[place] =
+                        march::pixel(&shown, self.layered, hits, lens, &ray, self.manner, scratch, &mut work);
                 }
             }
         }

@@ -1,9 +1,9 @@
 //! Which piece every voxel of a grid belongs to, for any number of cutters at once.
 //!
-//! A voxel belongs where its centre does, and the answer is that of [`Body::holds`] at the centre's place
+//! A voxel belongs where its centre does, and the answer is that of [`Body::holds`](super::Body::holds) at the centre's place
 //! in the world, bit for bit. Where a row of voxels is far from a surface, an interval says so for all of
 //! them: along a row every body is one stretch, whose ends are bounded with room for every rounding
-//! ([`rows`]). Only voxels between the bounds are asked one by one, so that cutters may be coincident,
+//! (`rows`). Only voxels between the bounds are asked one by one, so that cutters may be coincident,
 //! nearly parallel or go through voxel centres, in any order, and each voxel still has exactly one pattern.
 
 mod rows;
