@@ -190,10 +190,30 @@ pub(super) fn pixel(
     light.pixel()
 }
 
-/// Equal steps that divide a stretch of zeta.
+/// Passes a stretch in equal steps, each no longer than they may be, through what `step` says of it; whether the pixel
+/// is finished.
 #[inline(always)]
-fn parts([from, to]: [f32; 2], ray: &Ray, manner: Manner) -> u32 {
-    (((to - from) * ray.mm_per_zeta / manner.step_mm).ceil() as u32).max(1)
+fn pass(
+    [from, to]: [f32; 2],
+    ray: &Ray,
+    manner: Manner,
+    light: &mut Light,
+    mut step: impl FnMut(f32, f32) -> Option<[f32; 4]>,
+) -> bool {
+    let count = (((to - from) * ray.mm_per_zeta / manner.step_mm).ceil() as u32).max(1);
+    let length = (to - from) / count as f32;
+    let mut before = from;
+    for i in 1..=count {
+        let here = if i == count { to } else { from + length * i as f32 };
+        if let Some(depth) = step(before, here) {
+            light.absorb(depth);
+            if light.through < manner.dark {
+                return true;
+            }
+        }
+        before = here;
+    }
+    false
 }
 
 /// Through one piece.
@@ -201,24 +221,12 @@ fn parts([from, to]: [f32; 2], ray: &Ray, manner: Manner) -> u32 {
 fn march(walker: &mut Walker<'_>, [from, to]: [f32; 2], ray: &Ray, manner: Manner, light: &mut Light) {
     let mut at = from;
     loop {
-        let mut end = walker.exit.min(to);
-        if !walker.clear {
-            end = end.min(walker.next_paint(at));
-        }
-        if !walker.clear && end > at {
-            let count = parts([at, end], ray, manner);
-            let length = (end - at) / count as f32;
-            let mut before = at;
-            for i in 1..=count {
-                let here = if i == count { end } else { at + length * i as f32 };
-                if let Some(depth) = walker.step(before, here, ray) {
-                    light.absorb(depth);
-                    if light.through < manner.dark {
-                        return;
-                    }
-                }
-                before = here;
-            }
+        let end = walker.next_bend(at).min(to);
+        if !walker.clear
+            && end > at
+            && pass([at, end], ray, manner, light, |before, here| walker.step(before, here, ray))
+        {
+            return;
         }
         at = at.max(end);
         if at >= to {
@@ -240,14 +248,9 @@ fn march_many(
 ) {
     let mut at = from;
     loop {
-        let of = |w: &Walker<'_>| if w.clear { w.exit } else { w.exit.min(w.next_paint(at)) };
-        let end = walkers.iter().map(|(_, w)| of(w)).fold(to, f32::min);
+        let end = walkers.iter().map(|(_, w)| w.next_bend(at)).fold(to, f32::min);
         if end > at && walkers.iter().any(|(_, w)| !w.clear) {
-            let count = parts([at, end], ray, manner);
-            let length = (end - at) / count as f32;
-            let mut before = at;
-            for i in 1..=count {
-                let here = if i == count { end } else { at + length * i as f32 };
+            let step = |before: f32, here: f32| {
                 let mut depth = [0.0; 4];
                 for (_, walker) in walkers.iter_mut().filter(|(_, w)| !w.clear) {
                     let part = walker.step(before, here, ray).unwrap_or_default();
@@ -255,13 +258,10 @@ fn march_many(
                         depth[c] += part[c];
                     }
                 }
-                if depth[3] > 0.0 {
-                    light.absorb(depth);
-                    if light.through < manner.dark {
-                        return;
-                    }
-                }
-                before = here;
+                (depth[3] > 0.0).then_some(depth)
+            };
+            if pass([at, end], ray, manner, light, step) {
+                return;
             }
         }
         at = at.max(end);

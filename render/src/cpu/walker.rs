@@ -222,10 +222,13 @@ impl<'a> Walker<'a> {
         self.number_at(zeta) * table.scale + table.offset
     }
 
-    /// The first place after `zeta` where what is painted may change.
+    /// The end of the cell or of the clear box, or the first place after `zeta` where what is painted may change.
     #[inline(always)]
-    pub(super) fn next_paint(&self, zeta: f32) -> f32 {
-        self.paint_line.map_or(f32::INFINITY, |line| line.next_wall(zeta))
+    pub(super) fn next_bend(&self, zeta: f32) -> f32 {
+        match self.paint_line {
+            Some(line) if !self.clear => self.exit.min(line.next_wall(zeta)),
+            _ => self.exit,
+        }
     }
 
     /// Optical depth times colour, and optical depth, from `a`, where the last step ended or the cell begins, to `b`,

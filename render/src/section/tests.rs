@@ -127,33 +127,6 @@ fn a_cube_is_outlined_by_its_square() {
 }
 
 #[test]
-fn cutter_outlines_lie_on_the_cutter_and_in_the_plane() {
-    let section =
-        Section::new(Point::new(1.0, 2.0, 3.0), Vector::x(), -Vector::z(), 0.5, [80, 60]).expect("section");
-    let centre = Point::new(4.0, 5.0, 2.0);
-    let tilted = Vector::new(1.0, 0.7, -0.4);
-    let plane = Cutter::plane(centre, tilted).expect("plane");
-    let lines = cutter_outline(&section, &plane, 100.0);
-    assert_eq!(lines.len(), 1, "one line");
-    for p in lines.iter().flatten() {
-        assert!(tilted.dot(&(p - centre)).abs() < 1e-9, "on the plane: {p}");
-        assert!(section.depth_mm(p).abs() < 1e-9, "in the section: {p}");
-    }
-    for axis in [tilted, Vector::new(1.0, 0.0, 2.0)] {
-        let tube = Cutter::cylinder(centre, axis, 8.0).expect("tube");
-        let lines = cutter_outline(&section, &tube, 100.0);
-        assert!(!lines.is_empty(), "the tube is met");
-        for p in lines.iter().flatten() {
-            let distance = (p - centre).cross(&axis).norm() / axis.norm();
-            assert!((distance - 8.0).abs() < 1e-9, "on the tube: {distance}");
-            assert!(section.depth_mm(p).abs() < 1e-9, "in the section: {p}");
-        }
-    }
-    let parallel = Cutter::plane(centre, Vector::y()).expect("plane");
-    assert!(cutter_outline(&section, &parallel, 100.0).is_empty(), "a parallel plane is not met");
-}
-
-#[test]
 fn numbers_that_make_no_section_are_refused() {
     let make = |right, mm, size| Section::new(Point::origin(), right, Vector::y(), mm, size);
     assert_eq!(make(Vector::y(), 1.0, [4, 4]), Err(SectionError::Flat), "parallel");
