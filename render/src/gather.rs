@@ -146,6 +146,7 @@ impl Gathered {
         let spacing = world_from_voxel.column_lengths().into_iter().fold(f64::INFINITY, f64::min);
         self.finest_mm = Some(self.finest_mm.map_or(spacing, |f| f.min(spacing)));
         let table = self.table(&item.transfer, range);
+        let mut drawn: Option<(Arc<VolumeTexture>, Kind, usize)> = None;
         for piece in &item.pieces {
             let mut solid = ConvexSolid::from_box(low, high);
             let view_from_unmoved = view.view_from_world * piece.pose;
@@ -187,31 +188,11 @@ impl Gathered {
                 continue;
             };
             self.counts.fragments += 1;
-            let texture = if let Some(step) = &item.packed {
-                textures.step(gpu, step)?
-            } else {
-                let notes = &mut self.notes;
-                // One texture for all fragments, of all that the volume shows: cutting it makes none anew.
-                let plan = Plan::new(&item.grid, &item.transfer, item.texture, [low, high], caps, notes);
-                textures.get(gpu, &plan)?
+            // One texture for all fragments, of all that the volume shows: cutting it makes none anew.
+            let (texture, kind, position) = match &drawn {
+                Some(drawn) => drawn.clone(),
+                None => drawn.insert(self.texture(gpu, caps, item, [low, high], textures)?).clone(),
             };
-            let kind = match (texture.reading, item.shading) {
-                (Reading::Colour, Shading::None) => Kind::Color,
-                (Reading::Colour, Shading::Lit) => {
-                    let note = "a pre-classified texture has no gradient: its volume is drawn unlit";
-                    self.notes.push(note.to_owned());
-                    Kind::Color
-                }
-                (Reading::Scalar { .. }, Shading::None) => Kind::Scalar,
-                (Reading::Scalar { .. }, Shading::Lit) => Kind::ScalarLit,
-                (Reading::Stacked { .. }, Shading::None) => Kind::Stacked,
-                (Reading::Stacked { .. }, Shading::Lit) => Kind::StackedLit,
-            };
-            let position = self.textures.iter().position(|t| Arc::ptr_eq(t, &texture));
-            let position = position.unwrap_or_else(|| {
-                self.textures.push(Arc::clone(&texture));
-                self.textures.len() - 1
-            });
             let index = self.fragments.len() as u32;
             self.members.push(Member { proxy, volume: Some((index, kind, position)) });
             let transfer = Arc::clone(&item.transfer);
@@ -226,6 +207,41 @@ impl Gathered {
             });
         }
         Ok(())
+    }
+
+    /// The texture of what a volume shows within `bounds`, how it is read, and its place among the textures.
+    fn texture(
+        &mut self,
+        gpu: &Gpu,
+        caps: Caps,
+        item: &VolumeItem,
+        bounds: [Point; 2],
+        textures: &mut TextureCache,
+    ) -> Result<(Arc<VolumeTexture>, Kind, usize), GpuError> {
+        let texture = if let Some(step) = &item.packed {
+            textures.step(gpu, step)?
+        } else {
+            let plan = Plan::new(&item.grid, &item.transfer, item.texture, bounds, caps, &mut self.notes);
+            textures.get(gpu, &plan)?
+        };
+        let kind = match (texture.reading, item.shading) {
+            (Reading::Colour, Shading::None) => Kind::Color,
+            (Reading::Colour, Shading::Lit) => {
+                let note = "a pre-classified texture has no gradient: its volume is drawn unlit";
+                self.notes.push(note.to_owned());
+                Kind::Color
+            }
+            (Reading::Scalar { .. }, Shading::None) => Kind::Scalar,
+            (Reading::Scalar { .. }, Shading::Lit) => Kind::ScalarLit,
+            (Reading::Stacked { .. }, Shading::None) => Kind::Stacked,
+            (Reading::Stacked { .. }, Shading::Lit) => Kind::StackedLit,
+        };
+        let position = self.textures.iter().position(|t| Arc::ptr_eq(t, &texture));
+        let position = position.unwrap_or_else(|| {
+            self.textures.push(Arc::clone(&texture));
+            self.textures.len() - 1
+        });
+        Ok((texture, kind, position))
     }
 
     /// The box of the bricks of a grid that show anything; none where nothing does.

@@ -84,7 +84,8 @@ impl RecoveringRenderer {
     }
 
     fn retry<T>(&mut self, work: impl Fn(&mut Renderer) -> Result<T, GpuError>) -> Result<T, GpuError> {
-        for attempt in 0.. {
+        let before = self.losses;
+        loop {
             let done = match &mut self.renderer {
                 Some(renderer) => work(renderer),
                 None => (self.open)().and_then(|gpu| {
@@ -93,13 +94,12 @@ impl RecoveringRenderer {
                 }),
             };
             match done {
-                Err(GpuError::Lost { .. }) if attempt < RETRIES => {
+                Err(GpuError::Lost { .. }) if self.losses - before < RETRIES => {
                     self.renderer = None;
                     self.losses += 1;
                 }
                 other => return other,
             }
         }
-        Err(GpuError::Lost { reason: "it was lost time and again".to_owned() })
     }
 }

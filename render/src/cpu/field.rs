@@ -40,6 +40,8 @@ pub(super) struct Field {
     grid: Arc<Grid>,
     numbers: Numbers,
     pub(super) extent: [i32; 3],
+    /// From a sample to the next along each axis; 0 where there is but one.
+    strides: [usize; 3],
     pub(super) bricks: [usize; 3],
     /// Least and greatest stored number that interpolation in the brick can give.
     ranges: Vec<[f32; 2]>,
@@ -64,7 +66,10 @@ impl Field {
         };
         let bricks = grid.extent().map(|n| (n + 1).div_ceil(EDGE as usize));
         let extent = grid.extent().map(|n| n as i32);
-        let mut field = Self { grid: Arc::clone(grid), numbers, extent, bricks, ranges: Vec::new() };
+        let [nx, ny, nz] = grid.extent();
+        let stride = |n: usize, stride: usize| if n > 1 { stride } else { 0 };
+        let strides = [stride(nx, 1), stride(ny, nx), stride(nz, nx * ny)];
+        let mut field = Self { grid: Arc::clone(grid), numbers, extent, strides, bricks, ranges: Vec::new() };
         field.ranges = match field.values() {
             Values::Short(v) => field.ranges_of(v, f32::from),
             Values::Float(v) => field.ranges_of(v, |v| v),
@@ -134,43 +139,57 @@ pub(super) fn trilinear(corners: &[f32; 8], [x, y, z]: [f32; 3]) -> f32 {
 }
 
 impl Values<'_> {
-    /// The samples of a cell whose first is at `base`.
+    /// Samples of a cell: the first at `base`, the others by strides.
     #[inline(always)]
-    pub(super) fn corners(&self, base: usize, [x, y, z]: [usize; 3]) -> [f32; 8] {
+    fn corners(&self, base: usize, [x, y, z]: [usize; 3]) -> [f32; 8] {
         let at = [0, x, y, y + x, z, z + x, z + y, z + y + x];
+        let mut corners = [0.0; 8];
         match self {
             Self::Short(v) => {
                 let v = &v[base..=base + at[7]];
-                let mut corners = [0.0; 8];
                 for (corner, i) in corners.iter_mut().zip(at) {
                     *corner = f32::from(v[i]);
                 }
-                corners
             }
             Self::Float(v) => {
                 let v = &v[base..=base + at[7]];
-                let mut corners = [0.0; 8];
                 for (corner, i) in corners.iter_mut().zip(at) {
                     *corner = v[i];
                 }
-                corners
             }
         }
+        corners
+    }
+}
+
+impl Field {
+    /// The first sample of a cell, where the cell is held inside the samples.
+    #[inline(always)]
+    pub(super) fn low(&self, cell: [i32; 3]) -> [i32; 3] {
+        let mut low = cell;
+        for (low, n) in low.iter_mut().zip(self.extent) {
+            *low = (*low).clamp(0, (n - 2).max(0));
+        }
+        low
+    }
+
+    /// The samples at the corners of a cell whose first sample is `low`; bits are x, y, z.
+    #[inline(always)]
+    pub(super) fn corners(&self, values: Values<'_>, [x, y, z]: [i32; 3]) -> [f32; 8] {
+        let [sx, sy, sz] = self.strides;
+        values.corners(x as usize * sx + y as usize * sy + z as usize * sz, self.strides)
     }
 
     /// The trilinear scalar at a place, which is held inside the samples.
-    pub(super) fn sample(&self, at: [f32; 3], extent: [i32; 3]) -> f32 {
-        let (mut base, mut strides, mut stride, mut part) = (0, [0; 3], 1, [0.0_f32; 3]);
+    pub(super) fn sample(&self, values: Values<'_>, at: [f32; 3]) -> f32 {
+        let (mut place, mut cell) = (at, [0; 3]);
         for axis in 0..3 {
-            let n = extent[axis];
-            let place = at[axis].clamp(0.0, (n - 1) as f32);
-            let low = (place as i32).min((n - 2).max(0));
-            part[axis] = place - low as f32;
-            base += low as usize * stride;
-            strides[axis] = if n > 1 { stride } else { 0 };
-            stride *= n as usize;
+            place[axis] = at[axis].clamp(0.0, (self.extent[axis] - 1) as f32);
+            cell[axis] = place[axis] as i32;
         }
-        trilinear(&self.corners(base, strides), part)
+        let low = self.low(cell);
+        let part = [place[0] - low[0] as f32, place[1] - low[1] as f32, place[2] - low[2] as f32];
+        trilinear(&self.corners(values, low), part)
     }
 }
 

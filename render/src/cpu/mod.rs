@@ -43,7 +43,7 @@ use crate::image::FloatImage;
 use crate::renderer::{Quality, Stats};
 use crate::scene::{CameraError, Scene, TextureFormat, VolumeItem, VolumeMode};
 use crate::view::View;
-use crate::volume::{Grid, Transfer};
+use crate::volume::{Grid, Point, Transfer};
 use field::{Field, Occupancy};
 use layered::Layered;
 use line::Rays;
@@ -316,8 +316,11 @@ fn place<'a>(
     }
     for item in &scene.meshes {
         let view_from_mesh = view.view_from_world * item.pose;
-        for p in item.mesh.positions() {
-            near = near.min(view_from_mesh.point(p).z);
+        let [low, high] = item.mesh.bounds();
+        for corner in 0..8 {
+            let at =
+                [0, 1, 2].map(|axis: usize| if corner >> axis & 1 == 1 { high[axis] } else { low[axis] });
+            near = near.min(view_from_mesh.point(&Point::from(at)).z);
         }
     }
     let rays = Rays::new(view, if near.is_finite() { near.max(0.0) } else { 0.0 });

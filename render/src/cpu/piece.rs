@@ -146,13 +146,14 @@ impl<'a> Placed<'a> {
     /// |n·v| of the gradient at a voxel place, the central differences of the scalar; none where it is too flat to
     /// light.
     pub(super) fn facing(&self, at: [f32; 3], direction: [f32; 3]) -> Option<f32> {
-        let (values, extent) = (self.volume.field.values(), self.volume.field.extent);
+        let field = self.volume.field;
+        let values = field.values();
         let mut gradient = [0.0_f32; 3];
         for axis in 0..3 {
             let (mut before, mut after) = (at, at);
             before[axis] -= 1.0;
             after[axis] += 1.0;
-            let rise = values.sample(after, extent) - values.sample(before, extent);
+            let rise = field.sample(values, after) - field.sample(values, before);
             for (sum, along) in gradient.iter_mut().zip(self.gradient[axis]) {
                 *sum += rise * along;
             }

@@ -27,8 +27,6 @@ pub(super) struct Walker<'a> {
     inverse: [f32; 3],
     extent: [i32; 3],
     cell: [i32; 3],
-    /// Zeta at which the ray leaves the cell, or the clear box, by each axis.
-    next: [f32; 3],
     /// The walls ahead, of the cell or of the clear box.
     wall: [i32; 3],
     /// Where the cell or the clear box ends.
@@ -64,7 +62,6 @@ impl<'a> Walker<'a> {
             inverse: [1.0 / growth[0], 1.0 / growth[1], 1.0 / growth[2]],
             extent: piece.volume.field.extent,
             cell: [0; 3],
-            next: [0.0; 3],
             wall: [0; 3],
             exit: zeta,
             exit_axis: 0,
@@ -124,7 +121,6 @@ impl<'a> Walker<'a> {
     }
 
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "several arrays run along")]
     fn enter(&mut self) {
         for axis in 0..3 {
             if self.cell[axis] < -1 || self.cell[axis] >= self.extent[axis] {
@@ -139,6 +135,7 @@ impl<'a> Walker<'a> {
         let index = (brick[2] as usize * ny + brick[1] as usize) * nx + brick[0] as usize;
         let distance = i32::from(self.piece.volume.occupancy.distance[index]);
         self.clear = distance > 0;
+        let mut next = [0.0; 3];
         for axis in 0..3 {
             let forward = self.growth[axis] >= 0.0;
             self.wall[axis] = match (self.clear, forward) {
@@ -146,14 +143,14 @@ impl<'a> Walker<'a> {
                 (true, true) => ((brick[axis] + distance) * EDGE - 1).min(self.extent[axis]),
                 (true, false) => ((brick[axis] - distance + 1) * EDGE - 1).max(-1),
             };
-            self.next[axis] = self.reaches(axis);
+            next[axis] = self.reaches(axis);
         }
         if self.clear {
             self.position_known = false;
         } else {
             self.load();
         }
-        let [x, y, z] = self.next;
+        let [x, y, z] = next;
         self.exit_axis = if x <= y && x <= z {
             0
         } else if y <= z {
@@ -165,19 +162,12 @@ impl<'a> Walker<'a> {
     }
 
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "several arrays run along")]
     fn load(&mut self) {
         self.cells += 1;
-        let (mut base, mut strides, mut stride) = (0, [0; 3], 1);
-        for axis in 0..3 {
-            let n = self.extent[axis];
-            let low = self.cell[axis].clamp(0, (n - 2).max(0));
-            self.low[axis] = low as f32;
-            base += low as usize * stride;
-            strides[axis] = if n > 1 { stride } else { 0 };
-            stride *= n as usize;
-        }
-        self.corners = self.values.corners(base, strides);
+        let field = self.piece.volume.field;
+        let low = field.low(self.cell);
+        self.low = [low[0] as f32, low[1] as f32, low[2] as f32];
+        self.corners = field.corners(self.values, low);
     }
 
     pub(super) fn piece(&self) -> &'a Placed<'a> {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Window;
 use crate::scene::{Labels, Piece};
-use crate::volume::{Affine, Cutter, Grid, Point, Side, label_at};
+use crate::volume::{Affine, Body, Grid, Point, label_at};
 
 /// A volume as a section shows it.
 #[derive(Debug, Clone)]
@@ -26,8 +26,9 @@ pub struct Layer {
 }
 
 /// What one piece needs per pixel, prepared once.
-pub(super) struct Prepared<'a> {
-    pub(super) keep: &'a [(Cutter, Side)],
+pub(super) struct Prepared {
+    /// The bodies of the cutters, and whether their inside is kept.
+    pub(super) keep: Vec<(Body, bool)>,
     pub(super) unmoved_from_world: Affine,
     pub(super) voxel_from_world: Affine,
     /// To the voxels of the labels, where there are any.
@@ -35,23 +36,20 @@ pub(super) struct Prepared<'a> {
 }
 
 impl Layer {
-    pub(super) fn prepare(&self) -> Vec<Prepared<'_>> {
+    pub(super) fn prepare(&self) -> Vec<Prepared> {
         let voxel_from_unmoved = (self.pose * *self.grid.world_from_voxel()).inverse();
         let label_from_unmoved =
             self.labels.as_ref().map(|l| (l.pose * *l.grid.world_from_voxel()).inverse());
-        let prepare = |piece: &'_ Piece| {
+        let prepare = |piece: &Piece| {
             let unmoved_from_world = piece.pose.inverse();
-            let voxel_from_world = voxel_from_unmoved * unmoved_from_world;
-            let label_from_world = label_from_unmoved.map(|label| label * unmoved_from_world);
-            (unmoved_from_world, voxel_from_world, label_from_world)
+            Prepared {
+                keep: piece.keep.iter().map(|(cutter, side)| cutter.solid(*side)).collect(),
+                unmoved_from_world,
+                voxel_from_world: voxel_from_unmoved * unmoved_from_world,
+                label_from_world: label_from_unmoved.map(|label| label * unmoved_from_world),
+            }
         };
-        self.pieces
-            .iter()
-            .map(|piece| {
-                let (unmoved_from_world, voxel_from_world, label_from_world) = prepare(piece);
-                Prepared { keep: &piece.keep, unmoved_from_world, voxel_from_world, label_from_world }
-            })
-            .collect()
+        self.pieces.iter().map(prepare).collect()
     }
 
     /// The value at a world place, of the last piece that lies there; `None` where none does.
@@ -76,7 +74,7 @@ impl Layer {
             // The box is the cheaper question, so it comes first.
             let value = self.grid.sample(&piece.voxel_from_world.point(p))?;
             let unmoved = piece.unmoved_from_world.point(p);
-            let kept = piece.keep.iter().all(|(cutter, side)| cutter.keeps(*side, &unmoved));
+            let kept = piece.keep.iter().all(|(body, inside)| body.holds(&unmoved) == *inside);
             kept.then_some((index, value))
         })
     }

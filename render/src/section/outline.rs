@@ -165,13 +165,13 @@ pub fn piece_outlines(section: &Section, grid: &Grid, pose: &Affine, piece: &Pie
         let at = voxel_from_unmoved.point(p);
         at.iter().zip(grid.extent()).all(|(&c, n)| c >= -0.5 && c <= n as f64 - 0.5)
     };
+    // The borders of the sides that are kept, with the kerf on their other sides.
+    let bodies: Vec<(Body, bool)> = piece.keep.iter().map(|(cutter, side)| cutter.solid(*side)).collect();
     let mut lines = Vec::new();
-    for (cutter, (shape, side)) in piece.keep.iter().enumerate() {
-        let others = || piece.keep.iter().enumerate().filter(move |(other, _)| *other != cutter);
-        let bounds = |p: &Point| in_box(p) && others().all(|(_, (other, side))| other.keeps(*side, p));
-        // The border of the side that is kept, with the kerf on its other side.
-        let (body, _) = shape.solid(*side);
-        for line in body_outline(&unmoved, &body, body.faces().len(), reach_mm) {
+    for (cutter, (body, _)) in bodies.iter().enumerate() {
+        let others = || bodies.iter().enumerate().filter(move |(other, _)| *other != cutter);
+        let bounds = |p: &Point| in_box(p) && others().all(|(_, (other, inside))| other.holds(p) == *inside);
+        for line in body_outline(&unmoved, body, body.faces().len(), reach_mm) {
             let parts = clipped(&line, section.mm_per_pixel(), &bounds);
             lines.extend(parts.into_iter().map(|part| PieceLine {
                 cutter,

@@ -11,13 +11,13 @@ use crate::volume::label_at;
 /// A layer ready for rows.
 struct Ready<'a> {
     layer: &'a Layer,
-    pieces: Vec<(Prepared<'a>, Vec<Station>)>,
+    pieces: Vec<(Prepared, Vec<Station>)>,
 }
 
 impl<'a> Ready<'a> {
     fn of(section: &Section, layer: &'a Layer) -> Self {
         let extent = layer.grid.extent();
-        let with_stations = |piece: Prepared<'a>| {
+        let with_stations = |piece: Prepared| {
             let stations = stations(section, &piece.voxel_from_world, extent);
             (piece, stations)
         };

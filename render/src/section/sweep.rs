@@ -65,13 +65,12 @@ fn inside(row: &Row, extent: [usize; 3], width: usize) -> Range<usize> {
 }
 
 /// Which pixels of a range lie on the kept sides; all where nothing cuts. `kept` is scratch of the row's width.
-fn keep(piece: &Prepared<'_>, row_in_world: &Row, range: Range<usize>, kept: &mut [bool]) {
+fn keep(piece: &Prepared, row_in_world: &Row, range: Range<usize>, kept: &mut [bool]) {
     kept[range.clone()].fill(true);
     let row = row_in_world.in_space(&piece.unmoved_from_world);
-    for (cutter, side) in piece.keep {
-        let (body, inside) = cutter.solid(*side);
+    for (body, inside) in &piece.keep {
         // Far from a plane its height says the side; near it, and for all else, the body is asked itself.
-        let (first, rise, near) = match &body {
+        let (first, rise, near) = match body {
             Body::HalfSpace(Face { point, normal }) => {
                 let size = row.from.coords.amax() + point.coords.amax() + row.step.amax() * range.end as f64;
                 let height = normal.dot(&(row.from - point));
@@ -82,7 +81,7 @@ fn keep(piece: &Prepared<'_>, row_in_world: &Row, range: Range<usize>, kept: &mu
         for i in range.clone().filter(|&i| kept[i]).collect::<Vec<_>>() {
             let rough = first + rise * i as f64;
             let held = if rough.abs() > near { rough < 0.0 } else { body.holds(&row.at(i)) };
-            kept[i] = held == inside;
+            kept[i] = held == *inside;
         }
     }
 }
@@ -90,7 +89,7 @@ fn keep(piece: &Prepared<'_>, row_in_world: &Row, range: Range<usize>, kept: &mu
 /// Calls `take` with every pixel of a row that is in a piece, and the value there. `row` is in world space.
 pub(super) fn sweep(
     grid: &Grid,
-    piece: &Prepared<'_>,
+    piece: &Prepared,
     row: &Row,
     kept: &mut [bool],
     take: impl FnMut(usize, f64),
