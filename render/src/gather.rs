@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use crate::gpu::{Caps, Gpu, GpuError};
-use crate::passes::slabs::{Kind, MAX_GAPS, Member, Proxy, Spacing, gpu_data};
+use crate::passes::slabs::{GpuTable, Kind, MAX_GAPS, Member, Proxy, Spacing, TableCache, gpu_data};
 use crate::scene::{Scene, Shading, VolumeItem, VolumeMode};
 use crate::texture::{Plan, Reading, TextureCache, VolumeTexture};
-use crate::transfer::{NODES, ROWS, Table};
 use crate::view::{Form, View};
 use crate::volume::convex::{ConvexSolid, HalfSpace};
 use crate::volume::{Affine, Body, Bricks, Face, Grid, Point, Transfer, Vector};
@@ -21,7 +20,7 @@ struct Fragment {
     /// The faces, inwards, of prisms whose outside is kept.
     blocks: Vec<[HalfSpace; 5]>,
     transfer: Arc<Transfer>,
-    table: usize,
+    table: Arc<GpuTable>,
 }
 
 /// A cylinder or ball in view space.
@@ -50,10 +49,6 @@ pub(crate) struct Gathered {
     pub(crate) members: Vec<Member>,
     pub(crate) textures: Vec<Arc<VolumeTexture>>,
     pub(crate) textures_sent: u64,
-    /// Rows of all tables, [`NODES`] texels each.
-    pub(crate) tables: Vec<[f32; 4]>,
-    /// What each table is of: a function over a range of values.
-    known_tables: Vec<(Arc<Transfer>, [f64; 2], Table)>,
     pub(crate) notes: Vec<String>,
     pub(crate) counts: Counts,
     /// Least distance of samples over all volumes drawn, mm.
@@ -88,14 +83,16 @@ impl Gathered {
         view: &View,
         textures: &mut TextureCache,
         bricks: &mut BrickCache,
+        tables: &mut TableCache,
         texture_bytes: u64,
     ) -> Result<Self, GpuError> {
         let mut all = Self::default();
+        tables.begin();
         // Each volume has an equal share of what all may take.
         let texture_budget = texture_bytes / (scene.volumes.len() as u64).max(1);
         let caps = Caps { texture_budget, ..gpu.caps() };
         for item in &scene.volumes {
-            all.add_volume(gpu, caps, item, view, textures, bricks)?;
+            all.add_volume(gpu, caps, item, view, textures, bricks, tables)?;
         }
         textures.forget_unused();
         all.textures_sent = textures.take_sent();
@@ -123,6 +120,7 @@ impl Gathered {
         view: &View,
         textures: &mut TextureCache,
         bricks: &mut BrickCache,
+        tables: &mut TableCache,
     ) -> Result<(), GpuError> {
         if item.pieces.is_empty() {
             return Ok(());
@@ -145,7 +143,7 @@ impl Gathered {
         let world_from_voxel = item.pose * grid_place;
         let spacing = world_from_voxel.column_lengths().into_iter().fold(f64::INFINITY, f64::min);
         self.finest_mm = Some(self.finest_mm.map_or(spacing, |f| f.min(spacing)));
-        let table = self.table(&item.transfer, range);
+        let table = tables.get(&item.transfer, range);
         let mut drawn: Option<(Arc<VolumeTexture>, Kind, usize)> = None;
         for piece in &item.pieces {
             let mut solid = ConvexSolid::from_box(low, high);
@@ -203,7 +201,7 @@ impl Gathered {
                 rounds,
                 blocks,
                 transfer,
-                table,
+                table: Arc::clone(&table),
             });
         }
         Ok(())
@@ -253,18 +251,6 @@ impl Gathered {
         Some([0, 1].map(|end| Point::from(span.map(|s| s[end]))))
     }
 
-    fn table(&mut self, transfer: &Arc<Transfer>, range: [f64; 2]) -> usize {
-        if let Some(found) =
-            self.known_tables.iter().position(|(t, r, _)| Arc::ptr_eq(t, transfer) && *r == range)
-        {
-            return found;
-        }
-        let table = Table::new(transfer, range);
-        self.tables.extend_from_slice(&table.texels);
-        self.known_tables.push((Arc::clone(transfer), range, table));
-        self.known_tables.len() - 1
-    }
-
     /// The fragments, planes and round bodies as the shader reads them, seen from the stack's near plane.
     pub(crate) fn to_gpu(
         &self,
@@ -292,8 +278,7 @@ impl Gathered {
                     pad_1: 0,
                 }
             }));
-            let (_, _, table) = &self.known_tables[fragment.table];
-            let texture = &fragment.texture;
+            let (table, texture) = (&fragment.table, &fragment.texture);
             let points = fragment.transfer.points();
             let span = points[points.len() - 1].value - points[0].value;
             let span = if span > 0.0 { span } else { 1.0 };
@@ -321,8 +306,8 @@ impl Gathered {
                 gradient_y: gradient(1),
                 gradient_z: gradient(2),
                 table_scale: (texture.value_scale / table.step) as f32,
-                table_offset: ((texture.value_offset - table.first) / table.step) as f32,
-                table_row: (fragment.table * ROWS) as u32,
+                table_offset: (texture.value_offset / table.step + table.origin) as f32,
+                table_row: table.row,
                 unit_mm: fragment.transfer.unit_mm() as f32,
                 plane_first,
                 plane_end: block_first,
@@ -330,13 +315,12 @@ impl Gathered {
                 round_end: rounds.len() as u32,
                 block_first,
                 block_end: planes.len() as u32,
-                pad_0: 0,
-                pad_1: 0,
+                rest_scale: table.rest_scale,
+                rise_scale: table.rise_scale,
                 channel,
                 stack,
             });
         }
-        debug_assert_eq!(self.tables.len(), self.known_tables.len() * ROWS * NODES, "whole tables");
         (fragments, planes, rounds)
     }
 }

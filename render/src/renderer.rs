@@ -7,7 +7,7 @@ use crate::gather::{BrickCache, Counts, Gathered};
 use crate::gpu::{Gpu, GpuError, read_texture};
 use crate::image::FloatImage;
 use crate::passes::present::Present;
-use crate::passes::slabs::{Inputs, SLOTS, Slabs, Spacing, Stack, upload};
+use crate::passes::slabs::{Inputs, SLOTS, Slabs, Spacing, Stack, TableCache, upload};
 use crate::passes::surfaces::{LAYER_BYTES, Surfaces};
 use crate::scene::Scene;
 use crate::target::{Target, buffer_entry};
@@ -115,6 +115,7 @@ pub struct Renderer {
     present: Present,
     textures: TextureCache,
     bricks: BrickCache,
+    tables: TableCache,
     /// The step last sent ahead of its picture.
     sent: Option<Arc<VolumeTexture>>,
     target: Option<Target>,
@@ -143,6 +144,7 @@ impl Renderer {
             present,
             textures: TextureCache::default(),
             bricks: BrickCache::default(),
+            tables: TableCache::default(),
             sent: None,
             target: None,
             texture_bytes: TEXTURE_BYTES,
@@ -243,8 +245,15 @@ impl Renderer {
         let gpu = Arc::clone(&self.gpu);
         self.resize(size)?;
         let view = View::new(&scene.camera, size)?;
-        let gathered =
-            Gathered::new(&gpu, scene, &view, &mut self.textures, &mut self.bricks, self.texture_bytes)?;
+        let gathered = Gathered::new(
+            &gpu,
+            scene,
+            &view,
+            &mut self.textures,
+            &mut self.bricks,
+            &mut self.tables,
+            self.texture_bytes,
+        )?;
         let mut stats = self.stats(&gathered);
         let step_mm = gathered.finest_mm.map(|voxel| voxel * quality.voxels());
         let depth = |side: usize, start: f64, pick: fn(f64, f64) -> f64| {
@@ -271,12 +280,14 @@ impl Renderer {
             let frame = frame_data(scene, &view, &spacing);
             whole = bind_frame(&gpu, &self.frame_layout, &frame);
             let (fragments, planes, rounds) = gathered.to_gpu(&view, &spacing);
+            let tables = self.tables.texture(&gpu);
             let inputs = Inputs {
                 stack: &stack,
                 fragments: &fragments,
                 planes: &planes,
                 rounds: &rounds,
-                tables: &gathered.tables,
+                tables: &tables,
+                jumps: self.tables.has_jumps(),
                 textures: &gathered.textures,
             };
             let meshes = self.surfaces.prepare(&gpu, &scene.meshes, &view, spacing.near_mm);

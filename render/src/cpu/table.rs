@@ -1,10 +1,8 @@
-//! A transfer function for rays: the antiderivatives of extinction and of extinction times colour.
+//! A transfer function for rays: [`transfer::Table`] as lines of cache.
 //!
-//! Between two places of a ray on which the scalar runs linearly from `a` to `b`, the mean of extinction is
-//! (F(b) - F(a)) / (b - a), with F its antiderivative over the scalar: pre-integration with a table of one
-//! dimension (Engel 2001; Lum 2004). F is kept in `f64`, so that the difference keeps its digits however near
-//! `a` and `b` are.
+//! Sums are kept in `f64`, so that their differences keep their digits however near two places are.
 
+use crate::transfer::{self, Part, Parts};
 use crate::volume::{Grid, Transfer};
 
 /// Nodes over the values that occur.
@@ -24,18 +22,16 @@ pub(super) struct Node {
     pub(super) half_rise: [f32; 4],
 }
 
-/// A node within which extinction jumps: what it is between the jumps, linear in each part.
+/// A node within which extinction jumps.
 #[derive(Debug)]
 struct Jumps {
     node: usize,
-    /// Where each part ends, 0 to 1, and extinction at its begin and end.
-    parts: Vec<(f64, [[f64; 4]; 2])>,
+    parts: Vec<Part>,
 }
 
 /// A transfer function over the values of a grid; a *position* is a place in the table.
 ///
-/// Error: between two nodes extinction is taken as linear, which departs from −ln(1 − a) and at control points by
-/// at most the function's curvature over 1/2000 of the span of values between its first and last point.
+/// Error: that of [`transfer::Table`] with 2048 nodes over the span of values between its first and last point.
 #[derive(Debug)]
 pub(super) struct Table {
     nodes: Vec<Node>,
@@ -53,54 +49,26 @@ pub(super) struct Table {
 
 impl Table {
     pub(super) fn new(transfer: &Transfer, grid: &Grid) -> Self {
-        let points = transfer.points();
-        let [low, high] = grid.range();
-        let [first, last] = [points[0].value, points[points.len() - 1].value];
-        // Outside its points the function is constant: nodes are only needed where both, points and values, are.
-        let from = low.max(first).min(high);
-        let to = high.min(last).max(from);
-        let step = if to > from { (to - from) / (NODES - 1) as f64 } else { 1.0 };
-        let at = |value: f64| {
-            let ([r, g, b], tau) = transfer.classify(value);
-            [r * tau, g * tau, b * tau, tau]
-        };
-        // The last value is met without rounding: a jump may lie there.
-        let value =
-            |node: usize| if node == NODES { to } else { from + step * node.saturating_sub(1) as f64 };
+        let table = transfer::Table::new(transfer, grid.range(), NODES);
         let mut jumps: Vec<Jumps> = Vec::new();
-        // Node 0 lies one step before the first value and node NODES at the last: both go on without end.
-        let mut sum = [0.0; 4];
-        let mut nodes = Vec::with_capacity(NODES + 1);
-        for i in 0..=NODES {
-            let here = at(value(i));
-            // A jump at the very first value lies within node 0.
-            let here = if i == 0 && low < from { at(low) } else { here };
-            let inner =
-                if i == 0 || i == NODES { Vec::new() } else { parts(transfer, [value(i), value(i + 1)]) };
-            let ends = match &inner[..] {
-                [] => [here; 2],
-                [(_, ends)] => *ends,
-                _ => [here, [f64::NAN; 4]],
+        let mut nodes = Vec::with_capacity(table.nodes.len());
+        for (node, transfer::Node { sum, parts }) in table.nodes.iter().enumerate() {
+            let ends = match parts {
+                Parts::Whole(ends) => *ends,
+                Parts::Jumps(parts) => {
+                    jumps.push(Jumps { node, parts: parts.clone() });
+                    [parts[0].ends[0], [f64::NAN; 4]]
+                }
             };
             nodes.push(Node {
-                sum,
+                sum: *sum,
                 from: ends[0].map(|v| v as f32),
                 half_rise: std::array::from_fn(|c| (0.5 * (ends[1][c] - ends[0][c])) as f32),
             });
-            let mut begin = 0.0;
-            for (end, [a, b]) in &inner {
-                sum = std::array::from_fn(|c| sum[c] + 0.5 * (a[c] + b[c]) * (end - begin));
-                begin = *end;
-            }
-            if i == 0 {
-                sum = std::array::from_fn(|c| sum[c] + here[c]);
-            }
-            if inner.len() > 1 {
-                jumps.push(Jumps { node: i, parts: inner });
-            }
         }
+        let points = transfer.points();
         let rescale = grid.rescale();
-        let position = |value: f64| (value - from) / step + 1.0;
+        let position = |value: f64| table.position(value);
         let shown = points.iter().position(|p| p.rgba[3] > 0.0);
         let last_shown = points.iter().rposition(|p| p.rgba[3] > 0.0);
         let clear_below = match shown {
@@ -112,16 +80,16 @@ impl Table {
             Some(i) if i + 1 < points.len() => position(points[i + 1].value),
             _ => f64::INFINITY,
         };
-        let span = last - first;
+        let span = points[points.len() - 1].value - points[0].value;
         Self {
             nodes,
             jumps,
-            scale: (rescale.slope / step) as f32,
+            scale: (rescale.slope / table.step) as f32,
             offset: position(rescale.intercept) as f32,
             // The table's own rounding stays on the safe side.
             clear_below: clear_below as f32 - 1.0,
             clear_above: clear_above as f32 + 1.0,
-            flat: (crate::scene::light::FLAT * span / step) as f32,
+            flat: (crate::scene::light::FLAT * span / table.step) as f32,
         }
     }
 
@@ -149,7 +117,7 @@ impl Table {
         let (mut sum, mut rate, mut begin) = ([0.0; 4], [0.0; 4], 0.0);
         let part = f64::from(part);
         let known = self.jumps.iter().find(|j| j.node == node);
-        for (end, [a, b]) in known.into_iter().flat_map(|j| &j.parts) {
+        for Part { end, ends: [a, b] } in known.into_iter().flat_map(|j| &j.parts) {
             let width = end - begin;
             let inside = (part.min(*end) - begin).max(0.0);
             let share = inside / width;
@@ -223,31 +191,6 @@ impl Table {
     pub(super) fn nodes(&self) -> &[Node] {
         &self.nodes
     }
-}
-
-/// Extinction (times colour, and alone) from one value to another, by parts between jumps: where each ends, 0 to 1, and
-/// its extinction at both ends. One part where there is no jump between them.
-fn parts(transfer: &Transfer, [from, to]: [f64; 2]) -> Vec<(f64, [[f64; 4]; 2])> {
-    let tau = |rgba: [f64; 4]| {
-        let tau = transfer.extinction_of(rgba[3]);
-        [rgba[0] * tau, rgba[1] * tau, rgba[2] * tau, tau]
-    };
-    let points = transfer.points();
-    let mut parts = Vec::new();
-    let mut begin = tau(transfer.rgba(from));
-    for (i, point) in points.iter().enumerate() {
-        // The first of the points of one value, and the last.
-        let jumps = points.get(i + 1).is_some_and(|next| next.value == point.value)
-            && (i == 0 || points[i - 1].value < point.value);
-        if jumps && point.value > from && point.value <= to {
-            parts.push(((point.value - from) / (to - from), [begin, tau(point.rgba)]));
-            begin = tau(transfer.rgba(point.value));
-        }
-    }
-    if parts.last().is_none_or(|(end, _)| *end < 1.0) {
-        parts.push((1.0, [begin, tau(transfer.rgba(to))]));
-    }
-    parts
 }
 
 #[cfg(test)]

@@ -9,12 +9,14 @@
 
 mod polygons;
 mod stack;
+mod tables;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub(crate) use polygons::Proxy;
 pub(crate) use stack::{Draw, Member, Spacing, Stack, Stage, Vertex};
+pub(crate) use tables::{GpuTable, TableCache};
 
 use crate::gpu::{Gpu, GpuError};
 use crate::target::{Target, accumulation_format, bind_picture, buffer_entry, depth_state, texture_entry};
@@ -64,8 +66,8 @@ pub(crate) mod gpu_data {
         pub(crate) round_end: u32,
         pub(crate) block_first: u32,
         pub(crate) block_end: u32,
-        pub(crate) pad_0: u32,
-        pub(crate) pad_1: u32,
+        pub(crate) rest_scale: f32,
+        pub(crate) rise_scale: f32,
         pub(crate) channel: [f32; 4],
         pub(crate) stack: [f32; 4],
     }
@@ -91,7 +93,9 @@ pub(crate) struct Inputs<'a> {
     pub(crate) fragments: &'a [gpu_data::Fragment],
     pub(crate) planes: &'a [crate::view::Form],
     pub(crate) rounds: &'a [gpu_data::Round],
-    pub(crate) tables: &'a [[f32; 4]],
+    pub(crate) tables: &'a wgpu::TextureView,
+    /// Whether any transfer function jumps.
+    pub(crate) jumps: bool,
     pub(crate) textures: &'a [Arc<VolumeTexture>],
 }
 
@@ -109,8 +113,17 @@ pub(crate) struct Slabs {
     pipelines: BTreeMap<Variant, wgpu::RenderPipeline>,
 }
 
-/// What a shader is specialised to: stage, kinds of the slots, gaps, surfaces, translucent ones among them.
-type Variant = (Stage, [Kind; SLOTS], bool, bool, bool);
+/// What a shader is specialised to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Variant {
+    stage: Stage,
+    kinds: [Kind; SLOTS],
+    jumps: bool,
+    gaps: bool,
+    surfaces: bool,
+    /// Whether any surface of the picture is translucent.
+    layers: bool,
+}
 
 /// The buffers and groups of one frame, ready to be recorded.
 #[derive(Debug)]
@@ -133,6 +146,16 @@ impl Slabs {
         };
         let read =
             |binding| buffer_entry(binding, wgpu::ShaderStages::FRAGMENT, Storage { read_only: true }, false);
+        let tables = wgpu::BindGroupLayoutEntry {
+            binding: 4,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty: wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Uint,
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
+            count: None,
+        };
         let flat = |binding| texture_entry(binding, wgpu::TextureViewDimension::D2, false);
         let mut entries: Vec<_> =
             (0..SLOTS as u32).map(|b| texture_entry(b, wgpu::TextureViewDimension::D3, true)).collect();
@@ -143,7 +166,7 @@ impl Slabs {
             count: None,
         });
         let volumes = group("slabs.volumes", &entries);
-        let scene = group("slabs.scene", &[read(0), read(1), read(2), read(3), flat(4)]);
+        let scene = group("slabs.scene", &[read(0), read(1), read(2), read(3), tables]);
         let surfaces = group("slabs.surfaces", &[read(0), read(1), flat(2), flat(3), flat(4)]);
         let picture = target::picture_layout(gpu);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -207,7 +230,6 @@ impl Slabs {
             upload(gpu, "slabs.rounds", bytemuck::cast_slice(inputs.rounds), storage),
             upload(gpu, "slabs.components", bytemuck::cast_slice(&components), storage),
         ];
-        let table = upload_tables(gpu, inputs.tables);
         let scene = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("slabs.scene"),
             layout: &self.scene,
@@ -216,7 +238,7 @@ impl Slabs {
                 entry(1, planes.as_entire_binding()),
                 entry(2, rounds.as_entire_binding()),
                 entry(3, components.as_entire_binding()),
-                entry(4, wgpu::BindingResource::TextureView(&table)),
+                entry(4, wgpu::BindingResource::TextureView(inputs.tables)),
             ],
         });
         // Any buffer does where the shader never looks.
@@ -248,8 +270,14 @@ impl Slabs {
         let mut groups: BTreeMap<[usize; SLOTS], wgpu::BindGroup> = BTreeMap::new();
         let mut draws = Vec::with_capacity(inputs.stack.draws.len());
         for draw in &inputs.stack.draws {
-            let variant: Variant =
-                (draw.stage, draw.slots.map(|s| s.0), gaps, draw.surfaces, lists.is_some());
+            let variant = Variant {
+                stage: draw.stage,
+                kinds: draw.slots.map(|s| s.0),
+                jumps: inputs.jumps,
+                gaps,
+                surfaces: draw.surfaces,
+                layers: lists.is_some(),
+            };
             let textures = draw.slots.map(|(kind, texture)| match kind {
                 Kind::None => usize::MAX,
                 _ => texture,
@@ -294,13 +322,17 @@ impl Slabs {
         })
     }
 
-    fn pipeline(&self, gpu: &Gpu, (stage, kinds, gaps, surfaces, layers): Variant) -> wgpu::RenderPipeline {
+    fn pipeline(&self, gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
         const NAMES: [&str; SLOTS] = ["KIND_0", "KIND_1", "KIND_2", "KIND_3"];
         let mut constants: Vec<(&str, f64)> =
-            NAMES.iter().zip(kinds).map(|(name, kind)| (*name, f64::from(kind as u32))).collect();
-        constants.push(("GAPS", f64::from(u8::from(gaps))));
-        constants.push(("SURFACES", f64::from(u8::from(surfaces))));
-        constants.push(("LAYERS", f64::from(u8::from(layers))));
+            NAMES.iter().zip(variant.kinds).map(|(name, kind)| (*name, f64::from(kind as u32))).collect();
+        let flags = [
+            ("JUMPS", variant.jumps),
+            ("GAPS", variant.gaps),
+            ("SURFACES", variant.surfaces),
+            ("LAYERS", variant.layers),
+        ];
+        constants.extend(flags.map(|(name, on)| (name, f64::from(u8::from(on)))));
         let options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
         // Front to back: what is there already lets (1 - its opacity) of the new through.
         let under = wgpu::BlendComponent {
@@ -310,7 +342,7 @@ impl Slabs {
         };
         let add = wgpu::BlendComponent { dst_factor: wgpu::BlendFactor::One, ..under };
         let add = wgpu::BlendComponent { src_factor: wgpu::BlendFactor::One, ..add };
-        let (entry_point, blend, depth_stencil) = match stage {
+        let (entry_point, blend, depth_stencil) = match variant.stage {
             Stage::Whole => ("fs_main", under, Some(depth_state(false, wgpu::CompareFunction::GreaterEqual))),
             Stage::Sum => ("fs_sum", add, None),
             Stage::Mix => ("fs_mix", under, Some(depth_state(false, wgpu::CompareFunction::GreaterEqual))),
@@ -482,33 +514,4 @@ pub(crate) fn upload(
         gpu.queue.write_buffer(&buffer, 0, bytes);
     }
     buffer
-}
-
-/// All transfer tables as rows of one texture.
-fn upload_tables(gpu: &Gpu, texels: &[[f32; 4]]) -> wgpu::TextureView {
-    let width = crate::transfer::NODES as u32;
-    let height = (texels.len() as u32 / width).max(1);
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("slabs.tables"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba32Float,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
-    });
-    if !texels.is_empty() {
-        gpu.queue.write_texture(
-            texture.as_image_copy(),
-            bytemuck::cast_slice(texels),
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(width * 16),
-                rows_per_image: Some(height),
-            },
-            texture.size(),
-        );
-    }
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }

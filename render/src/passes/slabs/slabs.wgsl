@@ -27,7 +27,7 @@ struct Fragment {
     // Table position of a texel value t: t * table_scale + table_offset.
     table_scale: f32,
     table_offset: f32,
-    // First of the three rows of the fragment's table.
+    // First of the rows of the fragment's table.
     table_row: u32,
     // Length that a pre-classified opacity is of, mm.
     unit_mm: f32,
@@ -38,8 +38,9 @@ struct Fragment {
     // Among the planes: five for each block whose outside is kept.
     block_first: u32,
     block_end: u32,
-    pad_0: u32,
-    pad_1: u32,
+    // What whole numbers of 16 bits stand for in the table: of the sums' rest, and of rises.
+    rest_scale: f32,
+    rise_scale: f32,
     // What each channel of a texel adds to the value; x and y of `stack`: slices and layers of three slices each.
     channel: vec4<f32>,
     stack: vec4<f32>,
@@ -58,6 +59,8 @@ struct Round {
 }
 
 
+// Table positions nearer than this count as one: their quotient would have lost its digits.
+const EVEN: f32 = 1e-2;
 // Beyond every place of a stack, mm.
 const FAR: f32 = 1e30;
 
@@ -75,7 +78,7 @@ struct Component {
 @group(2) @binding(1) var<storage, read> planes: array<Form>;
 @group(2) @binding(2) var<storage, read> rounds: array<Round>;
 @group(2) @binding(3) var<storage, read> components: array<Component>;
-@group(2) @binding(4) var transfer_table: texture_2d<f32>;
+@group(2) @binding(4) var tables: texture_2d<u32>;
 
 @group(3) @binding(0) var<storage, read> heads: array<u32>;
 @group(3) @binding(1) var<storage, read> layers: array<Layer>;
@@ -90,6 +93,8 @@ override KIND_0: u32 = 0u;
 override KIND_1: u32 = 0u;
 override KIND_2: u32 = 0u;
 override KIND_3: u32 = 0u;
+// Whether any transfer function jumps.
+override JUMPS: bool = false;
 // Whether any fragment keeps the outside of a round body or a block.
 override GAPS: bool = false;
 // Whether surfaces may lie in the slab, and whether any of the picture's is translucent.
@@ -120,6 +125,24 @@ fn vs_main(
     return VertexOut(vec4<f32>(ndc, depth_of(zeta), 1.0), slab, component);
 }
 
+// What of a fragment is asked at every place: see there.
+struct Scalar {
+    channel: vec4<f32>,
+    table_scale: f32,
+    table_offset: f32,
+    table_row: u32,
+    rest_scale: f32,
+    rise_scale: f32,
+}
+
+// A place in a table, its antiderivative as two parts, and extinction there.
+struct Looked {
+    position: f32,
+    sum: vec4<f32>,
+    rest: vec4<f32>,
+    extinction: vec4<f32>,
+}
+
 // A fragment on one ray within one slab.
 struct Slot {
     // The kept part of the slab, zeta; start <= end.
@@ -128,11 +151,10 @@ struct Slot {
     // Texture coordinates at the near plane and per mm of zeta.
     origin: vec3<f32>,
     direction: vec3<f32>,
-    // The last sampled place, and what was there: table position and antiderivative, or colour.
+    // The last sampled place, and what was there: a place in the table, or colour as its extinction.
     zeta: f32,
-    position: f32,
-    high: vec4<f32>,
-    low: vec4<f32>,
+    here: Looked,
+    scalar: Scalar,
     // What is cut out, of which no two overlap; as many in every pixel, those that are not met without length.
     gap_count: u32,
     gaps: array<vec2<f32>, 8>,
@@ -224,31 +246,44 @@ fn open_slot(id: u32, e: vec3<f32>, z0: f32, z1: f32) -> Slot {
     slot.origin = vec3<f32>(u.x, v.x, w.x);
     slot.direction = vec3<f32>(u.y, v.y, w.y);
     slot.zeta = slot.start;
+    slot.scalar = Scalar(
+        fragments[id].channel,
+        fragments[id].table_scale,
+        fragments[id].table_offset,
+        fragments[id].table_row,
+        fragments[id].rest_scale,
+        fragments[id].rise_scale,
+    );
     return slot;
 }
 
-// Extinction x colour and extinction (1/mm) at a table position, held constant outside the table.
-fn classify(x: f32, row: u32) -> vec4<f32> {
-    let last = i32(textureDimensions(transfer_table).x) - 1;
-    let j = clamp(i32(floor(x)), 0, last - 1);
-    let part = clamp(x - f32(j), 0.0, 1.0);
-    let a = textureLoad(transfer_table, vec2<i32>(j, i32(row)), 0);
-    let b = textureLoad(transfer_table, vec2<i32>(j + 1, i32(row)), 0);
-    return a + (b - a) * part;
+// The last node of each table.
+fn last_node() -> f32 {
+    return f32(textureDimensions(tables).x) - 1.0;
 }
 
-// The antiderivative of `classify` as a sum of two parts, so that differences keep their digits.
-fn antiderivative(x: f32, row: u32, high: ptr<function, vec4<f32>>, low: ptr<function, vec4<f32>>) {
-    let last = i32(textureDimensions(transfer_table).x) - 1;
-    let j = clamp(i32(floor(x)), 0, last - 1);
-    let part = x - f32(j);
-    let inner = clamp(part, 0.0, 1.0);
-    let a = textureLoad(transfer_table, vec2<i32>(j, i32(row)), 0);
-    let b = textureLoad(transfer_table, vec2<i32>(j + 1, i32(row)), 0);
-    *high = textureLoad(transfer_table, vec2<i32>(j, i32(row) + 1), 0);
-    let beyond = (part - inner) * select(b, a, part < 0.0);
-    *low = textureLoad(transfer_table, vec2<i32>(j, i32(row) + 2), 0)
-        + inner * a + 0.5 * inner * inner * (b - a) + beyond;
+// What a table holds at a position; the first and the last node go on without end. Its rows: the antiderivative at the
+// node, rounded; level of extinction; what the rounding left, and the rise of extinction; where a jump is.
+fn look(position: f32, scalar: Scalar) -> Looked {
+    let j = clamp(floor(position), 0.0, last_node());
+    let at = vec2<u32>(u32(j), scalar.table_row);
+    let sum = bitcast<vec4<f32>>(textureLoad(tables, at, 0));
+    let level = bitcast<vec4<f32>>(textureLoad(tables, at + vec2<u32>(0u, 1u), 0));
+    let fine = textureLoad(tables, at + vec2<u32>(0u, 2u), 0);
+    let rest = vec4<f32>(unpack2x16snorm(fine.x), unpack2x16snorm(fine.y)) * scalar.rest_scale;
+    let rise = vec4<f32>(unpack2x16snorm(fine.z), unpack2x16snorm(fine.w)) * scalar.rise_scale;
+    let part = position - j;
+    // Without a jump extinction is the level in the node's middle, and linear.
+    var risen = part - 0.5;
+    var sum_of_risen = 0.5 * part * (part - 1.0);
+    if JUMPS {
+        let split = bitcast<f32>(textureLoad(tables, at + vec2<u32>(0u, 3u), 0).x);
+        if split >= 0.0 {
+            risen = select(0.0, 1.0, part >= split);
+            sum_of_risen = max(part - split, 0.0);
+        }
+    }
+    return Looked(position, sum, rest + part * level + sum_of_risen * rise, level + risen * rise);
 }
 
 fn place(slot: ptr<function, Slot>, zeta: f32) -> vec3<f32> {
@@ -270,7 +305,7 @@ fn slice_value(volume: texture_3d<f32>, at: vec2<f32>, slice: f32, layers: f32) 
 }
 
 // The texel value of a fragment at a place.
-fn value_at(kind: u32, id: u32, volume: texture_3d<f32>, at: vec3<f32>) -> f32 {
+fn value_at(kind: u32, channel: vec4<f32>, id: u32, volume: texture_3d<f32>, at: vec3<f32>) -> f32 {
     if kind == KIND_STACKED || kind == KIND_STACKED_LIT {
         let slices = fragments[id].stack.x;
         let layers = fragments[id].stack.y;
@@ -280,22 +315,23 @@ fn value_at(kind: u32, id: u32, volume: texture_3d<f32>, at: vec3<f32>) -> f32 {
         let b = slice_value(volume, at.xy, min(below + 1.0, slices - 1.0), layers);
         return a + (b - a) * (z - below);
     }
-    return dot(textureSampleLevel(volume, linear, at, 0.0), fragments[id].channel);
+    return dot(textureSampleLevel(volume, linear, at, 0.0), channel);
+}
+
+// What a fragment holds at a place.
+fn sampled(kind: u32, scalar: Scalar, id: u32, volume: texture_3d<f32>, at: vec3<f32>) -> Looked {
+    if kind == KIND_COLOR {
+        var here: Looked;
+        here.extinction = extinction_of(textureSampleLevel(volume, linear, at, 0.0), fragments[id].unit_mm);
+        return here;
+    }
+    let value = value_at(kind, scalar.channel, id, volume, at);
+    return look(value * scalar.table_scale + scalar.table_offset, scalar);
 }
 
 // Takes the sample at the slot's start.
 fn begin(kind: u32, slot: ptr<function, Slot>, id: u32, volume: texture_3d<f32>) {
-    let at = place(slot, (*slot).zeta);
-    if kind == KIND_COLOR {
-        (*slot).high = extinction_of(textureSampleLevel(volume, linear, at, 0.0), fragments[id].unit_mm);
-    } else {
-        (*slot).position = value_at(kind, id, volume, at) * fragments[id].table_scale + fragments[id].table_offset;
-        var high: vec4<f32>;
-        var low: vec4<f32>;
-        antiderivative((*slot).position, fragments[id].table_row, &high, &low);
-        (*slot).high = high;
-        (*slot).low = low;
-    }
+    (*slot).here = sampled(kind, (*slot).scalar, id, volume, place(slot, (*slot).zeta));
 }
 
 // What the slot's gaps leave of [a, b]: where it starts, where it ends, and how much of that is kept.
@@ -324,12 +360,13 @@ fn kept(slot: ptr<function, Slot>, a: f32, b: f32) -> vec3<f32> {
 
 // |n·v| of the gradient at a place, or -1 where the field is flat.
 fn facing(kind: u32, id: u32, volume: texture_3d<f32>, at: vec3<f32>, ray: vec3<f32>) -> f32 {
+    let channel = fragments[id].channel;
     let x = vec3<f32>(fragments[id].gradient_x.w, 0.0, 0.0);
     let y = vec3<f32>(0.0, fragments[id].gradient_y.w, 0.0);
     let z = vec3<f32>(0.0, 0.0, fragments[id].gradient_z.w);
-    let dx = value_at(kind, id, volume, at + x) - value_at(kind, id, volume, at - x);
-    let dy = value_at(kind, id, volume, at + y) - value_at(kind, id, volume, at - y);
-    let dz = value_at(kind, id, volume, at + z) - value_at(kind, id, volume, at - z);
+    let dx = value_at(kind, channel, id, volume, at + x) - value_at(kind, channel, id, volume, at - x);
+    let dy = value_at(kind, channel, id, volume, at + y) - value_at(kind, channel, id, volume, at - y);
+    let dz = value_at(kind, channel, id, volume, at + z) - value_at(kind, channel, id, volume, at - z);
     let gradient = dx * fragments[id].gradient_x.xyz
         + dy * fragments[id].gradient_y.xyz
         + dz * fragments[id].gradient_z.xyz;
@@ -359,39 +396,26 @@ fn advance(
     // Where a gap takes an end of the step, the values there: they are linear along it.
     let trimmed = GAPS && (part.x != a || part.y != b);
     let shares = (part.xy - a) / max(b - a, 1e-30);
-    let at = place(slot, b);
+    var before = (*slot).here;
+    let here = sampled(kind, (*slot).scalar, id, volume, place(slot, b));
+    (*slot).here = here;
     var mean: vec4<f32>;
     if kind == KIND_COLOR {
-        let here = extinction_of(textureSampleLevel(volume, linear, at, 0.0), fragments[id].unit_mm);
-        mean = mix((*slot).high, here, select(0.5, 0.5 * (shares.x + shares.y), trimmed));
-        (*slot).high = here;
+        mean = mix(before.extinction, here.extinction, select(0.5, 0.5 * (shares.x + shares.y), trimmed));
     } else {
-        let row = fragments[id].table_row;
-        let before = (*slot).position;
-        let here = value_at(kind, id, volume, at) * fragments[id].table_scale + fragments[id].table_offset;
-        var high: vec4<f32>;
-        var low: vec4<f32>;
-        antiderivative(here, row, &high, &low);
-        let last = f32(textureDimensions(transfer_table).x) - 1.0;
-        var ends = vec2<f32>(before, here);
-        var start_high = (*slot).high;
-        var start_low = (*slot).low;
-        var end_high = high;
-        var end_low = low;
+        var after = here;
         if trimmed {
-            ends = before + (here - before) * shares;
-            antiderivative(ends.x, row, &start_high, &start_low);
-            antiderivative(ends.y, row, &end_high, &end_low);
+            let rise = here.position - before.position;
+            after = look(before.position + rise * shares.y, (*slot).scalar);
+            before = look(before.position + rise * shares.x, (*slot).scalar);
         }
-        let beyond = min(ends.x, ends.y) >= last || max(ends.x, ends.y) <= 0.0;
-        if abs(ends.y - ends.x) > 1.0 && !beyond {
-            mean = ((end_high - start_high) + (end_low - start_low)) / (ends.y - ends.x);
+        let beyond = min(before.position, after.position) >= last_node() || max(before.position, after.position) <= 1.0;
+        let rise = after.position - before.position;
+        if abs(rise) > EVEN && !beyond {
+            mean = ((after.sum - before.sum) + (after.rest - before.rest)) / rise;
         } else {
-            mean = classify(0.5 * (ends.x + ends.y), row);
+            mean = after.extinction;
         }
-        (*slot).position = here;
-        (*slot).high = high;
-        (*slot).low = low;
         if (kind == KIND_SCALAR_LIT || kind == KIND_STACKED_LIT) && mean.a > 0.0 {
             let toward = facing(kind, id, volume, place(slot, 0.5 * (part.x + part.y)), ray.xyz);
             if toward >= 0.0 {
