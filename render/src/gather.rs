@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
+use crate::cpu::Skips;
 use crate::gpu::{Caps, Gpu, GpuError};
-use crate::passes::slabs::{GpuTable, Kind, MAX_GAPS, Member, Proxy, Spacing, TableCache, gpu_data};
+use crate::passes::slabs::{GpuTable, Kind, MAX_GAPS, Member, Proxy, Shown, Spacing, TableCache, gpu_data};
 use crate::scene::{Scene, Shading, VolumeItem, VolumeMode};
 use crate::texture::{Plan, Reading, TextureCache, VolumeTexture};
 use crate::view::{Form, View};
 use crate::volume::convex::{ConvexSolid, HalfSpace};
-use crate::volume::{Affine, Body, Bricks, Face, Grid, Point, Transfer, Vector};
+use crate::volume::{Affine, Body, Bricks, Face, Grid, Occupied, Point, Transfer, Vector};
 
 /// A fragment with its geometry in view space, before the near plane is known.
 #[derive(Debug)]
@@ -55,25 +56,60 @@ pub(crate) struct Gathered {
     pub(crate) finest_mm: Option<f64>,
 }
 
-/// Min-max bricks kept from frame to frame.
-#[derive(Debug, Default)]
-pub(crate) struct BrickCache {
-    kept: Vec<(Arc<Grid>, Arc<Bricks>)>,
+/// Boxes that say where a volume is not clear, at most.
+const MOST_BOXES: usize = 1 << 14;
+
+/// The bricks of a grid, and what a transfer function leaves of them.
+#[derive(Debug)]
+struct Bricked {
+    grid: Arc<Grid>,
+    bricks: Arc<Bricks>,
+    transfer: Arc<Transfer>,
+    occupied: Option<Arc<Occupied>>,
 }
 
-impl BrickCache {
-    fn get(&mut self, grid: &Arc<Grid>) -> Arc<Bricks> {
-        if let Some((_, found)) = self.kept.iter().find(|(g, _)| Arc::ptr_eq(g, grid)) {
-            return Arc::clone(found);
+impl Bricked {
+    fn is_of(&self, item: &VolumeItem) -> bool {
+        Arc::ptr_eq(&self.grid, &item.grid)
+            && (Arc::ptr_eq(&self.transfer, &item.transfer) || self.transfer == item.transfer)
+    }
+}
+
+/// What is kept from frame to frame.
+#[derive(Debug, Default)]
+pub(crate) struct Caches {
+    pub(crate) textures: TextureCache,
+    pub(crate) tables: TableCache,
+    bricks: Vec<Bricked>,
+}
+
+impl Caches {
+    /// How many bricks a volume has, and what its transfer function leaves of them.
+    fn occupied(&mut self, item: &VolumeItem) -> (usize, Option<Arc<Occupied>>) {
+        if let Some(known) = self.bricks.iter().find(|b| b.is_of(item)) {
+            return (known.bricks.len(), known.occupied.clone());
         }
-        let made = Arc::new(Bricks::of(grid));
-        self.kept.push((Arc::clone(grid), Arc::clone(&made)));
-        made
+        let same_grid = self.bricks.iter().find(|b| Arc::ptr_eq(&b.grid, &item.grid));
+        let bricks = same_grid.map_or_else(|| Arc::new(Bricks::of(&item.grid)), |b| Arc::clone(&b.bricks));
+        let occupied = bricks.occupied(&item.transfer, MOST_BOXES).map(Arc::new);
+        let (count, found) = (bricks.len(), occupied.clone());
+        let (grid, transfer) = (Arc::clone(&item.grid), Arc::clone(&item.transfer));
+        self.bricks.push(Bricked { grid, bricks, transfer, occupied });
+        (count, found)
     }
 
     fn forget_unused(&mut self, scene: &Scene) {
-        self.kept.retain(|(g, _)| scene.volumes.iter().any(|v| Arc::ptr_eq(&v.grid, g)));
+        self.textures.forget_unused();
+        self.bricks.retain(|b| scene.volumes.iter().any(|item| b.is_of(item)));
     }
+}
+
+/// What a picture may take and skip.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    /// What all textures may take where their format is left to the renderer.
+    pub(crate) texture_bytes: u64,
+    pub(crate) skips: Skips,
 }
 
 impl Gathered {
@@ -81,22 +117,19 @@ impl Gathered {
         gpu: &Gpu,
         scene: &Scene,
         view: &View,
-        textures: &mut TextureCache,
-        bricks: &mut BrickCache,
-        tables: &mut TableCache,
-        texture_bytes: u64,
+        caches: &mut Caches,
+        limits: Limits,
     ) -> Result<Self, GpuError> {
         let mut all = Self::default();
-        tables.begin();
+        caches.tables.begin();
         // Each volume has an equal share of what all may take.
-        let texture_budget = texture_bytes / (scene.volumes.len() as u64).max(1);
+        let texture_budget = limits.texture_bytes / (scene.volumes.len() as u64).max(1);
         let caps = Caps { texture_budget, ..gpu.caps() };
         for item in &scene.volumes {
-            all.add_volume(gpu, caps, item, view, textures, bricks, tables)?;
+            all.add_volume(gpu, caps, item, view, caches, limits.skips)?;
         }
-        textures.forget_unused();
-        all.textures_sent = textures.take_sent();
-        bricks.forget_unused(scene);
+        caches.forget_unused(scene);
+        all.textures_sent = caches.textures.take_sent();
         for item in &scene.meshes {
             if item.opacity <= 0.0 {
                 continue;
@@ -106,7 +139,7 @@ impl Gathered {
             let room = Vector::repeat((high - low).amax() * 1e-6 + 1e-9);
             let solid = ConvexSolid::from_box(low - room, high + room);
             let proxy = Proxy::new(&solid.transformed(&(view.view_from_world * item.pose)));
-            all.members.extend(proxy.map(|proxy| Member { proxy, volume: None }));
+            all.members.extend(proxy.map(|proxy| Member { proxy, volume: None, shown: None }));
         }
         all.notes.dedup();
         Ok(all)
@@ -118,9 +151,8 @@ impl Gathered {
         caps: Caps,
         item: &VolumeItem,
         view: &View,
-        textures: &mut TextureCache,
-        bricks: &mut BrickCache,
-        tables: &mut TableCache,
+        caches: &mut Caches,
+        skips: Skips,
     ) -> Result<(), GpuError> {
         if item.pieces.is_empty() {
             return Ok(());
@@ -131,19 +163,32 @@ impl Gathered {
         if item.labels.is_some() {
             return Err(GpuError::CpuOnly { what: "a volume with labels" });
         }
-        let (bounds, grid_place, range) = if let Some(step) = &item.packed {
-            (Some(step.bounds()), *step.world_from_voxel(), step.range())
-        } else {
-            (self.occupied(item, bricks), *item.grid.world_from_voxel(), item.grid.range())
+        let (grid_place, range) = match &item.packed {
+            Some(step) => (*step.world_from_voxel(), step.range()),
+            None => (*item.grid.world_from_voxel(), item.grid.range()),
         };
-        let Some([low, high]) = bounds else {
-            self.counts.fragments_empty += item.pieces.len() as u32;
-            return Ok(());
+        let mut occupied = None;
+        let [low, high] = if let Some(step) = &item.packed {
+            step.bounds()
+        } else if skips.empty {
+            let (bricks, found) = caches.occupied(item);
+            self.counts.bricks += bricks as u64;
+            let Some(found) = found else {
+                self.counts.fragments_empty += item.pieces.len() as u32;
+                return Ok(());
+            };
+            self.counts.bricks_occupied += found.bricks as u64;
+            let span = found.span;
+            occupied = Some(found);
+            [0, 1].map(|end| Point::from(span.map(|s| s[end])))
+        } else {
+            let extent = item.grid.extent().map(|n| n as f64 - 0.5);
+            [Point::new(-0.5, -0.5, -0.5), Point::from(extent)]
         };
         let world_from_voxel = item.pose * grid_place;
         let spacing = world_from_voxel.column_lengths().into_iter().fold(f64::INFINITY, f64::min);
         self.finest_mm = Some(self.finest_mm.map_or(spacing, |f| f.min(spacing)));
-        let table = tables.get(&item.transfer, range);
+        let table = caches.tables.get(&item.transfer, range);
         let mut drawn: Option<(Arc<VolumeTexture>, Kind, usize)> = None;
         for piece in &item.pieces {
             let mut solid = ConvexSolid::from_box(low, high);
@@ -189,10 +234,17 @@ impl Gathered {
             // One texture for all fragments, of all that the volume shows: cutting it makes none anew.
             let (texture, kind, position) = match &drawn {
                 Some(drawn) => drawn.clone(),
-                None => drawn.insert(self.texture(gpu, caps, item, [low, high], textures)?).clone(),
+                None => {
+                    drawn.insert(self.texture(gpu, caps, item, [low, high], &mut caches.textures)?).clone()
+                }
             };
             let index = self.fragments.len() as u32;
-            self.members.push(Member { proxy, volume: Some((index, kind, position)) });
+            let shown = occupied.as_ref().map(|occupied| Shown {
+                occupied: Arc::clone(occupied),
+                view_from_voxel,
+                planes: planes.clone(),
+            });
+            self.members.push(Member { proxy, volume: Some((index, kind, position)), shown });
             let transfer = Arc::clone(&item.transfer);
             self.fragments.push(Fragment {
                 texture,
@@ -240,15 +292,6 @@ impl Gathered {
             self.textures.len() - 1
         });
         Ok((texture, kind, position))
-    }
-
-    /// The box of the bricks of a grid that show anything; none where nothing does.
-    fn occupied(&mut self, item: &VolumeItem, bricks: &mut BrickCache) -> Option<[Point; 2]> {
-        let bricks = bricks.get(&item.grid);
-        self.counts.bricks += bricks.len() as u64;
-        let (span, occupied) = bricks.occupied(&item.transfer)?;
-        self.counts.bricks_occupied += occupied as u64;
-        Some([0, 1].map(|end| Point::from(span.map(|s| s[end]))))
     }
 
     /// The fragments, planes and round bodies as the shader reads them, seen from the stack's near plane.

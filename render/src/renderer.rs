@@ -3,15 +3,16 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::gather::{BrickCache, Counts, Gathered};
+use crate::cpu::Skips;
+use crate::gather::{Caches, Counts, Gathered, Limits};
 use crate::gpu::{Gpu, GpuError, read_texture};
 use crate::image::FloatImage;
 use crate::passes::present::Present;
-use crate::passes::slabs::{Inputs, SLOTS, Slabs, Spacing, Stack, TableCache, upload};
+use crate::passes::slabs::{Inputs, SLOTS, Slabs, Spacing, Stack, upload};
 use crate::passes::surfaces::{LAYER_BYTES, Surfaces};
 use crate::scene::Scene;
 use crate::target::{Target, buffer_entry};
-use crate::texture::{StepDecoder, TextureCache, TextureSummary, VolumeTexture};
+use crate::texture::{StepDecoder, TextureSummary, VolumeTexture};
 use crate::view::{View, gpu_data};
 use crate::volume::{Grid, PackedStep};
 
@@ -42,7 +43,7 @@ impl Quality {
 }
 
 /// Sub-steps in a slab, unless a stack would have too many slabs.
-const STEPS: u32 = 8;
+const STEPS: u32 = 12;
 /// What all textures may take at first. No interface tells how much memory there is: a small graphics card has it.
 const TEXTURE_BYTES: u64 = 1 << 30;
 /// Below this, memory is not what is short.
@@ -83,9 +84,9 @@ pub struct Stats {
     pub saturate_looks: u32,
     /// Crossings of surfaces: of translucent ones by the GPU, of all by the CPU.
     pub layers: u64,
-    /// By the CPU: tiles of the picture, once for each fragment.
+    /// Tiles of the picture, by the CPU once for each fragment, by the GPU for each slab.
     pub tiles: u64,
-    /// By the CPU: tiles in which a fragment shows nothing.
+    /// Those in which nothing shows.
     pub tiles_skipped: u64,
     /// By the CPU: cells of volumes that rays went through.
     pub cells: u64,
@@ -113,14 +114,13 @@ pub struct Renderer {
     slabs: Slabs,
     surfaces: Surfaces,
     present: Present,
-    textures: TextureCache,
-    bricks: BrickCache,
-    tables: TableCache,
+    caches: Caches,
     /// The step last sent ahead of its picture.
     sent: Option<Arc<VolumeTexture>>,
     target: Option<Target>,
     /// What all textures of a picture may take where their format is left to the renderer; bytes.
     texture_bytes: u64,
+    skips: Skips,
 }
 
 impl Renderer {
@@ -142,12 +142,11 @@ impl Renderer {
             slabs,
             surfaces,
             present,
-            textures: TextureCache::default(),
-            bricks: BrickCache::default(),
-            tables: TableCache::default(),
+            caches: Caches::default(),
             sent: None,
             target: None,
             texture_bytes: TEXTURE_BYTES,
+            skips: Skips::default(),
         })
     }
 
@@ -158,7 +157,7 @@ impl Renderer {
 
     /// What decodes the steps of time series from now on; [`StepDecoder::Auto`] at first.
     pub fn set_step_decoder(&mut self, decoder: StepDecoder) {
-        self.textures.set_decoder(decoder);
+        self.caches.textures.set_decoder(decoder);
     }
 
     /// What all textures of a picture may take from now on where their format is left to the renderer; bytes. Each
@@ -166,7 +165,12 @@ impl Renderer {
     /// with a note.
     pub fn set_texture_bytes(&mut self, bytes: u64) {
         self.texture_bytes = bytes;
-        self.textures.clear();
+        self.caches.textures.clear();
+    }
+
+    /// What is skipped from now on; all that can be at first.
+    pub fn set_skips(&mut self, skips: Skips) {
+        self.skips = skips;
     }
 
     /// Takes `new` for `old` from now on, which differs from it only in the voxels from `touched[0]` to before
@@ -181,7 +185,7 @@ impl Renderer {
         new: &Arc<Grid>,
         touched: [[usize; 3]; 2],
     ) -> Result<[u64; 2], GpuError> {
-        self.textures.replace(&self.gpu, old, new, touched)
+        self.caches.textures.replace(&self.gpu, old, new, touched)
     }
 
     /// Sends a step of a time series to the device before it is drawn, and keeps it for the next picture in place of
@@ -192,8 +196,8 @@ impl Renderer {
     pub fn send_step(&mut self, step: &PackedStep) -> Result<(), GpuError> {
         let gpu = Arc::clone(&self.gpu);
         self.sent = None;
-        self.textures.forget_unused();
-        self.sent = Some(self.textures.step(&gpu, step)?);
+        self.caches.textures.forget_unused();
+        self.sent = Some(self.caches.textures.step(&gpu, step)?);
         // Work begins without waiting for a picture.
         gpu.submit(None);
         Ok(())
@@ -245,15 +249,8 @@ impl Renderer {
         let gpu = Arc::clone(&self.gpu);
         self.resize(size)?;
         let view = View::new(&scene.camera, size)?;
-        let gathered = Gathered::new(
-            &gpu,
-            scene,
-            &view,
-            &mut self.textures,
-            &mut self.bricks,
-            &mut self.tables,
-            self.texture_bytes,
-        )?;
+        let limits = Limits { texture_bytes: self.texture_bytes, skips: self.skips };
+        let gathered = Gathered::new(&gpu, scene, &view, &mut self.caches, limits)?;
         let mut stats = self.stats(&gathered);
         let step_mm = gathered.finest_mm.map(|voxel| voxel * quality.voxels());
         let depth = |side: usize, start: f64, pick: fn(f64, f64) -> f64| {
@@ -280,14 +277,14 @@ impl Renderer {
             let frame = frame_data(scene, &view, &spacing);
             whole = bind_frame(&gpu, &self.frame_layout, &frame);
             let (fragments, planes, rounds) = gathered.to_gpu(&view, &spacing);
-            let tables = self.tables.texture(&gpu);
+            let tables = self.caches.tables.texture(&gpu);
             let inputs = Inputs {
                 stack: &stack,
                 fragments: &fragments,
                 planes: &planes,
                 rounds: &rounds,
                 tables: &tables,
-                jumps: self.tables.has_jumps(),
+                jumps: self.caches.tables.has_jumps(),
                 textures: &gathered.textures,
             };
             let meshes = self.surfaces.prepare(&gpu, &scene.meshes, &view, spacing.near_mm);
@@ -299,6 +296,8 @@ impl Renderer {
             stats.slabs = spacing.slabs;
             stats.slabs_occupied = stack.occupied;
             stats.off_screen_skipped = stack.off_screen;
+            stats.tiles = stack.tiles;
+            stats.tiles_skipped = stack.tiles_skipped;
             stats.most_overlapping = stack.most_overlapping as u32;
             let most = gpu.caps().storage_bytes;
             let width = u64::from(size[0]);
@@ -339,7 +338,8 @@ impl Renderer {
                 let ready = self.slabs.prepare(&gpu, &inputs, target, lists)?;
                 let mut encoder =
                     gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-                stats.saturate_looks += self.slabs.draw(&gpu, &mut encoder, &ready, target, &bound, rows);
+                stats.saturate_looks +=
+                    self.slabs.draw(&gpu, &mut encoder, &ready, target, &bound, rows, self.skips.finished);
                 gpu.submit(Some(encoder));
                 stats.draws += stack.draws.len() as u32;
                 stats.bands += 1;

@@ -84,7 +84,22 @@ pub(crate) fn agrees(scene: &Scene, what: &str, psnr_db: f64, max: f64) -> Stats
     assert!(d.psnr_db >= psnr_db && d.max <= max, "{what}: {d:?}");
     let lit = truth.pixels.iter().filter(|p| p[3] > 0.1).count();
     assert!(lit > 200, "{what}: only {lit} pixels show anything");
+    skips_agree(scene, what);
     stats
+}
+
+/// Holds the GPU's picture to the one for which nothing is skipped.
+fn skips_agree(scene: &Scene, what: &str) {
+    let mut renderer = renderer();
+    let [skipped, whole] = [true, false].map(|skip| {
+        renderer.set_skips(Skips { empty: skip, finished: skip });
+        let stats = renderer.render(scene, SIZE, Quality::Good).unwrap();
+        (renderer.read().unwrap(), stats)
+    });
+    renderer.set_skips(Skips::default());
+    let d = skipped.0.difference(&whole.0, scene.background).unwrap();
+    assert!(d.max <= 255.0 / 512.0, "{what}: skipping on the GPU changed it by {} / 255", d.max);
+    assert!(whole.1.bricks_skipped == 0 && whole.1.saturate_looks == 0, "{what}: nothing is skipped");
 }
 
 /// Holds the CPU's picture to the reference, and to itself with other instructions, threads and nothing skipped.

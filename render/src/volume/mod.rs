@@ -23,7 +23,7 @@ mod space;
 pub mod synth;
 mod transfer;
 
-pub use bricks::Bricks;
+pub use bricks::{Bricks, Occupied};
 pub use cells::CellGrid;
 pub use cutter::{Body, Cutter, CutterError, Face, Shape, Side};
 pub use grid::{Grid, GridError, Rescale, Samples};

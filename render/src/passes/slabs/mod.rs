@@ -7,6 +7,7 @@
 //! Engel et al. 2001 (pre-integration). Differs: a slice integrates its slab instead of sampling a point,
 //! overlapping parts are summed before the exponential, surfaces split the slab at their exact depth.
 
+mod coverage;
 mod polygons;
 mod stack;
 mod tables;
@@ -14,6 +15,7 @@ mod tables;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+pub(crate) use coverage::Shown;
 pub(crate) use polygons::Proxy;
 pub(crate) use stack::{Draw, Member, Spacing, Stack, Stage, Vertex};
 pub(crate) use tables::{GpuTable, TableCache};
@@ -388,6 +390,7 @@ impl Slabs {
         target: &Target,
         frame: &wgpu::BindGroup,
         rows: std::ops::Range<u32>,
+        skip_finished: bool,
     ) -> u32 {
         let picture = bind_picture(gpu, &self.picture, &target.picture_view);
         let mut looks = 0;
@@ -397,7 +400,7 @@ impl Slabs {
             let slab = first.slabs[0];
             if slab >= until {
                 until = slab + SATURATE_EVERY;
-                if next > 0 {
+                if next > 0 && skip_finished {
                     looks += 1;
                     self.saturate(encoder, target, frame, &picture, &rows);
                 }

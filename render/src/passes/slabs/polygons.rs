@@ -59,7 +59,7 @@ impl Proxy {
         if at_eye {
             return vec![[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
         }
-        in_picture(hull(points))
+        clipped(hull(points), [[-1.0, 1.0]; 2])
     }
 }
 
@@ -88,24 +88,36 @@ pub(crate) fn hull(mut points: Polygon) -> Polygon {
     if chain.len() < 3 { Polygon::new() } else { chain }
 }
 
-/// What of a convex polygon lies in the picture.
-fn in_picture(mut polygon: Polygon) -> Polygon {
-    for (axis, sign) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)] {
-        let inside = |p: &[f64; 2]| 1.0 - sign * p[axis];
-        let mut kept = Vec::with_capacity(polygon.len() + 2);
-        for (a, b) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
-            let (va, vb) = (inside(a), inside(b));
-            if va >= 0.0 {
-                kept.push(*a);
+/// What of a convex polygon lies between low and high x and y.
+pub(crate) fn clipped(mut polygon: Polygon, rectangle: [[f64; 2]; 2]) -> Polygon {
+    for (axis, [low, high]) in rectangle.into_iter().enumerate() {
+        for (sign, bound) in [(1.0, -low), (-1.0, high)] {
+            let inside = |p: &[f64; 2]| bound + sign * p[axis];
+            if polygon.iter().all(|p| inside(p) >= 0.0) {
+                continue;
             }
-            if (va >= 0.0) != (vb >= 0.0) {
-                let t = va / (va - vb);
-                kept.push([a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t]);
+            let mut kept = Vec::with_capacity(polygon.len() + 2);
+            for (a, b) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
+                let (va, vb) = (inside(a), inside(b));
+                if va >= 0.0 {
+                    kept.push(*a);
+                }
+                if (va >= 0.0) != (vb >= 0.0) {
+                    let t = va / (va - vb);
+                    kept.push([a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t]);
+                }
             }
+            polygon = kept;
         }
-        polygon = kept;
     }
     polygon
+}
+
+/// Least and greatest x and y of a polygon.
+pub(crate) fn bounds(polygon: &Polygon) -> [[f64; 2]; 2] {
+    polygon.iter().fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], p| {
+        [[low[0].min(p[0]), low[1].min(p[1])], [high[0].max(p[0]), high[1].max(p[1])]]
+    })
 }
 
 /// Whether two convex polygons share a point, by separating lines along their edges.

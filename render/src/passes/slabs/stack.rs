@@ -1,7 +1,8 @@
 //! The common stack of slabs: which members each slab holds, which of them must be integrated together,
 //! and the vertices and draws that follow, front to back.
 
-use super::polygons::{Polygon, Proxy, hull, overlap};
+use super::coverage::{Coverage, Shown, TileSet, Tiles};
+use super::polygons::{Polygon, Proxy, bounds, clipped, hull, overlap};
 use super::{Kind, SATURATE_EVERY, SLOTS};
 use crate::view::View;
 
@@ -12,6 +13,8 @@ pub(crate) struct Member {
     /// Index into the fragment buffer, what its texture is, and its index among the textures; `None` for
     /// a mesh.
     pub(crate) volume: Option<(u32, Kind, usize)>,
+    /// What of a volume is not clear, where that is known.
+    pub(crate) shown: Option<Shown>,
 }
 
 /// One corner of a proxy polygon.
@@ -108,11 +111,17 @@ pub(crate) struct Stack {
     pub(crate) off_screen: u32,
     /// The most fragments integrated together.
     pub(crate) most_overlapping: usize,
+    /// Tiles of all slabs, and those in which nothing shows.
+    pub(crate) tiles: u64,
+    pub(crate) tiles_skipped: u64,
 }
 
 impl Stack {
     pub(crate) fn new(members: &[Member], view: &View, spacing: &Spacing) -> Self {
         let mut stack = Self::default();
+        let tiles = Tiles::new(view.size);
+        let coverage = |m: &Member| Some(Coverage::new(m.shown.as_ref()?, tiles, view, spacing));
+        let coverages: Vec<Option<Coverage>> = members.iter().map(coverage).collect();
         for slab in 0..spacing.slabs {
             let near = spacing.near_mm + f64::from(slab) * spacing.slab_mm();
             let far = near + spacing.slab_mm();
@@ -128,28 +137,63 @@ impl Stack {
                     present.push((index, polygon));
                 }
             }
-            stack.occupied += u32::from(!present.is_empty());
+            let drawn = stack.vertices.len();
             for group in groups(present) {
-                stack.add(slab, members, &group);
+                let pieces = stack.pieces(slab, tiles, &coverages, &group);
+                if !pieces.is_empty() {
+                    stack.add(slab, members, &group, &pieces);
+                }
             }
+            stack.occupied += u32::from(stack.vertices.len() > drawn);
         }
         stack
     }
 
-    fn add(&mut self, slab: u32, members: &[Member], group: &Group) {
+    /// What of a group's outline may show anything, in convex pieces that share no pixel.
+    fn pieces(
+        &mut self,
+        slab: u32,
+        tiles: Tiles,
+        coverages: &[Option<Coverage>],
+        group: &Group,
+    ) -> Vec<Polygon> {
+        let [low, high] = bounds(&group.outline);
+        let Some(within) = tiles.between(low, high) else { return Vec::new() };
+        let mut set = TileSet::new(tiles);
+        for (member, [low, high]) in group.members.iter().zip(&group.bounds) {
+            match (&coverages[*member], tiles.between(*low, *high)) {
+                (Some(coverage), _) => coverage.add_to(slab, &mut set),
+                (None, Some(around)) => set.insert(around),
+                (None, None) => {}
+            }
+        }
+        let runs = set.runs(within);
+        let wide = |[first, last]: [u32; 2]| u64::from(last - first + 1);
+        let all = wide(within[0]) * wide(within[1]);
+        let shown: u64 = runs.iter().map(|(columns, _)| wide(*columns)).sum();
+        self.tiles += all;
+        self.tiles_skipped += all - shown;
+        if shown == all {
+            return vec![group.outline.clone()];
+        }
+        let piece = |(columns, row)| clipped(group.outline.clone(), tiles.rectangle(columns, row));
+        runs.into_iter().map(piece).filter(|piece| piece.len() > 2).collect()
+    }
+
+    fn add(&mut self, slab: u32, members: &[Member], group: &Group, pieces: &[Polygon]) {
         let surfaces = group.members.iter().any(|&m| members[m].volume.is_none());
         let mut volumes: Vec<_> = group.members.iter().filter_map(|&m| members[m].volume).collect();
         self.most_overlapping = self.most_overlapping.max(volumes.len());
         // By kind, so that fewer different shaders are made.
         volumes.sort_by_key(|&(fragment, kind, _)| (kind, fragment));
         if volumes.len() <= SLOTS {
-            self.draw(slab, Stage::Whole, &volumes, surfaces, &group.outline);
+            self.draw(slab, Stage::Whole, &volumes, surfaces, pieces);
             return;
         }
         for chunk in volumes.chunks(SLOTS) {
-            self.draw(slab, Stage::Sum, chunk, false, &group.outline);
+            self.draw(slab, Stage::Sum, chunk, false, pieces);
         }
-        self.draw(slab, Stage::Mix, &[], surfaces, &group.outline);
+        self.draw(slab, Stage::Mix, &[], surfaces, pieces);
     }
 
     fn draw(
@@ -158,7 +202,7 @@ impl Stack {
         stage: Stage,
         volumes: &[(u32, Kind, usize)],
         surfaces: bool,
-        outline: &Polygon,
+        pieces: &[Polygon],
     ) {
         let mut slots: Slots = [(Kind::None, 0); SLOTS];
         let mut fragments = [u32::MAX; SLOTS];
@@ -173,8 +217,10 @@ impl Stack {
         }) as u32;
         let first = self.vertices.len() as u32;
         let corner = |p: [f64; 2]| Vertex { ndc: p.map(|c| c as f32), slab, component };
-        for pair in outline[1..].windows(2) {
-            self.vertices.extend([outline[0], pair[0], pair[1]].map(corner));
+        for piece in pieces {
+            for pair in piece[1..].windows(2) {
+                self.vertices.extend([piece[0], pair[0], pair[1]].map(corner));
+            }
         }
         let end = self.vertices.len() as u32;
         match self.draws.last_mut() {
@@ -195,6 +241,8 @@ impl Stack {
 /// Members to be integrated together, and the convex polygon around them.
 struct Group {
     members: Vec<usize>,
+    /// Of each member's own outline.
+    bounds: Vec<[[f64; 2]; 2]>,
     outline: Polygon,
 }
 
@@ -203,10 +251,11 @@ struct Group {
 fn groups(present: Vec<(usize, Polygon)>) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for (member, polygon) in present {
-        let mut joined = Group { members: vec![member], outline: polygon };
+        let mut joined = Group { members: vec![member], bounds: vec![bounds(&polygon)], outline: polygon };
         while let Some(touching) = groups.iter().position(|g| overlap(&g.outline, &joined.outline)) {
             let other = groups.swap_remove(touching);
             joined.members.extend(other.members);
+            joined.bounds.extend(other.bounds);
             joined.outline.extend(other.outline);
             joined.outline = hull(joined.outline);
         }
