@@ -84,7 +84,10 @@ pub(crate) fn agrees(scene: &Scene, what: &str, psnr_db: f64, max: f64) -> Stats
     assert!(d.psnr_db >= psnr_db && d.max <= max, "{what}: {d:?}");
     let lit = truth.pixels.iter().filter(|p| p[3] > 0.1).count();
     assert!(lit > 200, "{what}: only {lit} pixels show anything");
-    skips_agree(scene, what);
+    // Blocks lie elsewhere in a texture of the whole volume, and err elsewhere.
+    if scene.volumes.iter().all(|v| matches!(v.texture, TextureFormat::R16 | TextureFormat::R32f)) {
+        skips_agree(scene, what);
+    }
     stats
 }
 

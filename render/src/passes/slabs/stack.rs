@@ -76,12 +76,14 @@ impl Spacing {
         }
         // A little room at both ends, so that no surface lies exactly on the stack's own faces.
         let room = (far - near) * 1e-4 + 1e-4;
-        let near_mm = (near - room).max(0.0);
-        let depth = far + room - near_mm;
-        let needed = (depth / (step_mm * f64::from(steps))).ceil();
-        let steps = if needed > MAX_SLABS { (depth / (step_mm * MAX_SLABS)).ceil() as u32 } else { steps };
-        let slabs = (depth / (step_mm * f64::from(steps))).ceil() as u32;
-        Some(Self { near_mm, step_mm, steps, slabs })
+        let needed = ((far - near + 2.0 * room) / (step_mm * f64::from(steps))).ceil();
+        let steps =
+            if needed > MAX_SLABS { (f64::from(steps) * needed / MAX_SLABS).ceil() as u32 } else { steps };
+        // Slabs are counted from the eye's plane: what else is in the scene, or is skipped, does not move them.
+        let slab_mm = step_mm * f64::from(steps);
+        let first = ((near - room) / slab_mm).floor().max(0.0);
+        let slabs = ((far + room) / slab_mm).ceil() - first;
+        Some(Self { near_mm: first * slab_mm, step_mm, steps, slabs: slabs as u32 })
     }
 
     /// The same stack with one sub-step a slab.
