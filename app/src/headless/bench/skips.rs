@@ -1,5 +1,4 @@
-//! `skips`: what is saved by not doing what a scene does not need, by the processor; and what cutting costs in textures,
-//! on the GPU.
+//! `skips`: what is saved by not doing what a scene does not need, by both renderers; and what cutting costs in textures.
 //!
 //! What stands beside each other takes turns, frame by frame, and the least time of each counts.
 
@@ -26,16 +25,44 @@ const TURNS: usize = 7;
 /// Measures.
 pub(super) fn run(input: &Input, bench: &mut Bench) -> Result<(), Failure> {
     let scene = scene::scene(&input.case, &input.assets);
-    on_and_off(&scene, bench)?;
-    edits(&scene, bench)?;
+    let gpu = Arc::new(Gpu::headless()?);
+    let new: [(&str, &dyn Fn() -> Result<Drawer, Failure>); 2] = [
+        ("cpu", &|| Ok(Drawer::Cpu(CpuRenderer::new()))),
+        ("gpu", &|| Ok(Drawer::Gpu(Box::new(Renderer::new(Arc::clone(&gpu))?)))),
+    ];
+    for (name, new) in new {
+        on_and_off(&scene, name, new, bench)?;
+        edits(&scene, name, new()?, bench)?;
+    }
     for volume in &scene.volumes {
-        cuts(&Scene { volumes: vec![volume.clone()], meshes: Vec::new(), ..scene.clone() }, bench)?;
+        cuts(&Scene { volumes: vec![volume.clone()], meshes: Vec::new(), ..scene.clone() }, &gpu, bench)?;
     }
     Ok(())
 }
 
-fn draw(renderer: &mut CpuRenderer, scene: &Scene) -> Result<(FloatImage, Stats), Failure> {
-    Ok(renderer.render(scene, SIZE, Quality::Good, &|_, _| true)?)
+/// Either renderer.
+enum Drawer {
+    Cpu(CpuRenderer),
+    Gpu(Box<Renderer>),
+}
+
+impl Drawer {
+    fn set_skips(&mut self, skips: Skips) {
+        match self {
+            Self::Cpu(renderer) => renderer.set_skips(skips),
+            Self::Gpu(renderer) => renderer.set_skips(skips),
+        }
+    }
+
+    fn draw(&mut self, scene: &Scene) -> Result<(FloatImage, Stats), Failure> {
+        match self {
+            Self::Cpu(renderer) => Ok(renderer.render(scene, SIZE, Quality::Good, &|_, _| true)?),
+            Self::Gpu(renderer) => {
+                let stats = renderer.render(scene, SIZE, Quality::Good)?;
+                Ok((renderer.read()?, stats))
+            }
+        }
+    }
 }
 
 /// The least times of some things that take turns; ms.
@@ -52,21 +79,27 @@ fn least<const N: usize>(mut turn: impl FnMut(usize) -> Result<f64, Failure>) ->
     Ok(least)
 }
 
-fn on_and_off(scene: &Scene, bench: &mut Bench) -> Result<(), Failure> {
+fn on_and_off(
+    scene: &Scene,
+    name: &str,
+    new: &dyn Fn() -> Result<Drawer, Failure>,
+    bench: &mut Bench,
+) -> Result<(), Failure> {
     let settings = [
         Skips::default(),
         Skips { empty: false, finished: true },
         Skips { empty: true, finished: false },
         Skips { empty: false, finished: false },
     ];
-    let mut renderers = settings.map(|skips| {
-        let mut renderer = CpuRenderer::new();
-        renderer.set_skips(skips);
-        renderer
-    });
+    let mut drawers = Vec::with_capacity(settings.len());
+    for skips in settings {
+        let mut drawer = new()?;
+        drawer.set_skips(skips);
+        drawers.push(drawer);
+    }
     let mut pictures: [Option<FloatImage>; 4] = [const { None }; 4];
     let [on, all_cells, to_the_end, off] = least(|which| {
-        let (picture, stats) = draw(&mut renderers[which], scene)?;
+        let (picture, stats) = drawers[which].draw(scene)?;
         pictures[which] = Some(picture);
         Ok(stats.frame_ms)
     })?;
@@ -77,15 +110,14 @@ fn on_and_off(scene: &Scene, bench: &mut Bench) -> Result<(), Failure> {
         _ => f64::NAN,
     };
     bench.report(json!({
-        "bench": "skips", "what": "on and off", "renderer": "cpu", "size": SIZE, "on_ms": on,
+        "bench": "skips", "what": "on and off", "renderer": name, "size": SIZE, "on_ms": on,
         "empty_bricks_drawn_ms": all_cells, "finished_pixels_drawn_ms": to_the_end, "off_ms": off,
         "off_to_on": off / on, "max_apart_255": apart,
     }))
 }
 
 /// A frame after a changed transfer function, and after a moved cut, beside a frame after nothing but another view.
-fn edits(scene: &Scene, bench: &mut Bench) -> Result<(), Failure> {
-    let mut renderer = CpuRenderer::new();
+fn edits(scene: &Scene, name: &str, mut drawer: Drawer, bench: &mut Bench) -> Result<(), Failure> {
     let mut scene = scene.clone();
     let (eye, mut frame) = (scene.camera.eye, 0.0);
     let [plain, edited, recut] = least(|which| {
@@ -104,7 +136,7 @@ fn edits(scene: &Scene, bench: &mut Bench) -> Result<(), Failure> {
                 }
             }
         }
-        let drawn = draw(&mut renderer, &scene)?.1.frame_ms;
+        let drawn = drawer.draw(&scene)?.1.frame_ms;
         if which == 2 {
             // The next two are of the whole again; what they know of the volume stays.
             for volume in &mut scene.volumes {
@@ -113,12 +145,12 @@ fn edits(scene: &Scene, bench: &mut Bench) -> Result<(), Failure> {
         }
         // The new function is drawn once more, so that the next plain frame finds it ready.
         if which == 1 {
-            draw(&mut renderer, &scene)?;
+            drawer.draw(&scene)?;
         }
         Ok(drawn)
     })?;
     bench.report(json!({
-        "bench": "skips", "what": "edits", "renderer": "cpu", "size": SIZE, "plain_ms": plain,
+        "bench": "skips", "what": "edits", "renderer": name, "size": SIZE, "plain_ms": plain,
         "transfer_edited_ms": edited, "transfer_above_plain": (edited - plain) / plain,
         "recut_ms": recut, "recut_to_plain": recut / plain,
     }))
@@ -192,8 +224,8 @@ fn patterns(volume: &VolumeItem) -> Result<Vec<(&'static str, Vec<Piece>)>, Fail
 }
 
 /// Texture memory and time of each pattern, beside the volume in one piece.
-fn cuts(scene: &Scene, bench: &mut Bench) -> Result<(), Failure> {
-    let mut renderer = Renderer::new(Arc::new(Gpu::headless()?))?;
+fn cuts(scene: &Scene, gpu: &Arc<Gpu>, bench: &mut Bench) -> Result<(), Failure> {
+    let mut renderer = Renderer::new(Arc::clone(gpu))?;
     let mut scene = scene.clone();
     let Some(whole) = scene.volumes.first().cloned() else { return Ok(()) };
     scene.volumes[0].shading = Shading::None;
