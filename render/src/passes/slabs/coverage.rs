@@ -1,6 +1,7 @@
 //! Where a fragment can show anything: which tiles of the picture, slab by slab. What a transfer function makes clear is
 //! neither drawn nor looked at.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -18,6 +19,9 @@ const MOST_TILES: u32 = 64;
 /// Room around a box, so that rounding takes nothing away: pixels, and a part of a slab.
 const ROOM_PIXELS: f64 = 0.1;
 const ROOM_SLABS: f64 = 1e-3;
+
+/// Low and high end of x, then of y, in normalised coordinates.
+pub(crate) type Rectangle = [[f64; 2]; 2];
 
 /// The tiles of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,8 +56,17 @@ impl Tiles {
         Some([x, y])
     }
 
-    /// What a run of tiles covers, in normalised coordinates: x, then y, low end first.
-    pub(crate) fn rectangle(self, columns: [u32; 2], row: u32) -> [[f64; 2]; 2] {
+    /// Column and row of each tile within bounds, row by row.
+    pub(crate) fn each(self, [x, y]: [[u32; 2]; 2]) -> impl Iterator<Item = [u32; 2]> {
+        (y[0]..=y[1]).flat_map(move |row| (x[0]..=x[1]).map(move |column| [column, row]))
+    }
+
+    fn index(self, [column, row]: [u32; 2]) -> usize {
+        (row * self.count[0] + column) as usize
+    }
+
+    /// What a run of tiles covers.
+    pub(crate) fn rectangle(self, columns: [u32; 2], row: u32) -> Rectangle {
         let end =
             |a: usize, tile: u32| f64::from((tile * self.edge).min(self.size[a])) / f64::from(self.size[a]);
         [
@@ -119,63 +132,79 @@ impl Coverage {
         let Some([x, y]) = self.tiles.between(low, high) else { return };
         let words = self.tiles.words();
         for slab in first.max(0.0) as usize..=(last as usize).min(spacing.slabs as usize - 1) {
-            for row in y[0]..=y[1] {
-                for column in x[0]..=x[1] {
-                    let bit = (row * self.tiles.count[0] + column) as usize;
-                    let word = &self.slabs[slab * words + bit / 64];
-                    let mask = 1 << (bit % 64);
-                    if word.load(Ordering::Relaxed) & mask == 0 {
-                        word.fetch_or(mask, Ordering::Relaxed);
-                    }
+            for tile in self.tiles.each([x, y]) {
+                let bit = self.tiles.index(tile);
+                let word = &self.slabs[slab * words + bit / 64];
+                let mask = 1 << (bit % 64);
+                if word.load(Ordering::Relaxed) & mask == 0 {
+                    word.fetch_or(mask, Ordering::Relaxed);
                 }
             }
         }
     }
 
-    /// Adds the tiles of a slab to a set.
-    pub(crate) fn add_to(&self, slab: u32, set: &mut TileSet) {
-        let words = self.tiles.words();
-        let own = &self.slabs[slab as usize * words..][..words];
-        for (sum, word) in set.words.iter_mut().zip(own) {
-            *sum |= word.load(Ordering::Relaxed);
-        }
+    /// Whether anything may show in a tile of a slab.
+    pub(crate) fn has(&self, slab: u32, tile: [u32; 2]) -> bool {
+        let bit = self.tiles.index(tile);
+        let word = &self.slabs[slab as usize * self.tiles.words() + bit / 64];
+        word.load(Ordering::Relaxed) >> (bit % 64) & 1 == 1
     }
 }
 
-/// Tiles of the picture.
+/// What shows in each tile of a slab.
 #[derive(Debug)]
-pub(crate) struct TileSet {
+pub(crate) struct Sets {
     tiles: Tiles,
-    words: Vec<u64>,
+    /// Words a tile, a bit for each member.
+    stride: usize,
+    bits: Vec<u64>,
+    seen: Vec<bool>,
+    /// Tiles in which something might show, and does.
+    pub(crate) looked: u64,
+    pub(crate) shown: u64,
 }
 
-impl TileSet {
-    pub(crate) fn new(tiles: Tiles) -> Self {
-        Self { tiles, words: vec![0; tiles.words()] }
+impl Sets {
+    pub(crate) fn new(tiles: Tiles, members: usize) -> Self {
+        let (stride, count) = (members.div_ceil(64), (tiles.count[0] * tiles.count[1]) as usize);
+        Self { tiles, stride, bits: vec![0; stride * count], seen: vec![false; count], looked: 0, shown: 0 }
     }
 
-    pub(crate) fn insert(&mut self, [x, y]: [[u32; 2]; 2]) {
-        for row in y[0]..=y[1] {
-            for column in x[0]..=x[1] {
-                let bit = (row * self.tiles.count[0] + column) as usize;
-                self.words[bit / 64] |= 1 << (bit % 64);
-            }
+    fn of(&self, tile: usize) -> &[u64] {
+        &self.bits[tile * self.stride..][..self.stride]
+    }
+
+    /// Notes that a member may show in a tile, and whether it does.
+    pub(crate) fn look(&mut self, tile: [u32; 2], member: usize, shows: bool) {
+        let tile = self.tiles.index(tile);
+        self.looked += u64::from(!std::mem::replace(&mut self.seen[tile], true));
+        if shows {
+            self.shown += u64::from(self.of(tile).iter().all(|&word| word == 0));
+            self.bits[tile * self.stride + member / 64] |= 1 << (member % 64);
         }
     }
 
-    /// Runs of tiles within bounds: first and last column, and row.
-    pub(crate) fn runs(&self, [x, y]: [[u32; 2]; 2]) -> Vec<([u32; 2], u32)> {
-        let mut runs: Vec<([u32; 2], u32)> = Vec::new();
-        for row in y[0]..=y[1] {
-            for column in x[0]..=x[1] {
-                let bit = (row * self.tiles.count[0] + column) as usize;
-                if self.words[bit / 64] >> (bit % 64) & 1 == 0 {
+    /// Runs of tiles in which the same members show, by those members.
+    pub(crate) fn runs(&self) -> BTreeMap<Vec<usize>, Vec<Rectangle>> {
+        let mut runs: BTreeMap<Vec<usize>, Vec<Rectangle>> = BTreeMap::new();
+        if self.shown == 0 {
+            return runs;
+        }
+        let [width, height] = self.tiles.count;
+        for row in 0..height {
+            let of = |column| self.of(self.tiles.index([column, row]));
+            let mut first = 0;
+            for column in 1..=width {
+                if column < width && of(column) == of(first) {
                     continue;
                 }
-                match runs.last_mut() {
-                    Some((columns, last)) if *last == row && columns[1] + 1 == column => columns[1] = column,
-                    _ => runs.push(([column; 2], row)),
+                let bits = of(first);
+                let members: Vec<usize> =
+                    (0..64 * self.stride).filter(|m| bits[m / 64] >> (m % 64) & 1 == 1).collect();
+                if !members.is_empty() {
+                    runs.entry(members).or_default().push(self.tiles.rectangle([first, column - 1], row));
                 }
+                first = column;
             }
         }
         runs
@@ -206,13 +235,6 @@ mod tests {
             };
             let spacing = Spacing { near_mm: 20.0, step_mm: 0.5, steps: 8, slabs: 25 };
             let coverage = Coverage::new(&shown, tiles, &view, &spacing);
-            let sets: Vec<TileSet> = (0..spacing.slabs)
-                .map(|slab| {
-                    let mut set = TileSet::new(tiles);
-                    coverage.add_to(slab, &mut set);
-                    set
-                })
-                .collect();
             let mut seen = 0;
             for ends in &occupied.boxes {
                 for i in 0..20 * 20 * 20 {
@@ -228,18 +250,33 @@ mod tests {
                     let tile =
                         |a: usize, part: f64| (part * f64::from(size[a]) / f64::from(tiles.edge)) as u32;
                     let (x, y) = (tile(0, (ndc[0] + 1.0) / 2.0), tile(1, (1.0 - ndc[1]) / 2.0));
-                    let found = sets[slab as usize].runs([[x, x], [y, y]]);
-                    assert_eq!(found, [([x, x], y)], "{at:?} in slab {slab}");
+                    assert!(coverage.has(slab as u32, [x, y]), "{at:?} in slab {slab}");
                     seen += 1;
                 }
             }
             assert!(seen > 1000, "only {seen} points lay in the picture");
             let all = [[0, tiles.count[0] - 1], [0, tiles.count[1] - 1]];
-            let marked =
-                |set: &TileSet| set.runs(all).iter().map(|(c, _)| u64::from(c[1] - c[0] + 1)).sum::<u64>();
-            let total: u64 = sets.iter().map(marked).sum();
+            let marked = |slab| tiles.each(all).filter(|tile| coverage.has(slab, *tile)).count() as u64;
+            let total: u64 = (0..spacing.slabs).map(marked).sum();
             let most = u64::from(spacing.slabs * tiles.count[0] * tiles.count[1]);
             assert!(total < most / 4, "{total} of {most} tiles");
         }
+    }
+
+    #[test]
+    fn tiles_with_the_same_members_are_drawn_together() {
+        let tiles = Tiles::new([64, 32]);
+        let mut sets = Sets::new(tiles, 70);
+        for tile in [[0, 0], [1, 0], [2, 0], [1, 1]] {
+            sets.look(tile, 3, true);
+        }
+        sets.look([1, 0], 69, true);
+        sets.look([3, 1], 69, false);
+        assert_eq!((sets.looked, sets.shown), (5, 4), "tiles");
+        let runs = sets.runs();
+        assert_eq!(runs.keys().collect::<Vec<_>>(), [&vec![3], &vec![3, 69]], "sets of members");
+        assert_eq!(runs[&vec![3, 69]], [[[-0.5, 0.0], [0.0, 1.0]]], "where both are");
+        let alone = [[[-1.0, -0.5], [0.0, 1.0]], [[0.0, 0.5], [0.0, 1.0]], [[-0.5, 0.0], [-1.0, 0.0]]];
+        assert_eq!(runs[&vec![3]], alone, "where one is");
     }
 }

@@ -120,18 +120,6 @@ pub(crate) fn bounds(polygon: &Polygon) -> [[f64; 2]; 2] {
     })
 }
 
-/// Whether two convex polygons share a point, by separating lines along their edges.
-pub(crate) fn overlap(a: &Polygon, b: &Polygon) -> bool {
-    let separates = |p: &Polygon, q: &Polygon| {
-        p.iter().zip(p.iter().cycle().skip(1)).any(|(s, e)| {
-            let normal = [e[1] - s[1], s[0] - e[0]];
-            let beyond = |r: &[f64; 2]| (r[0] - s[0]) * normal[0] + (r[1] - s[1]) * normal[1] > 0.0;
-            q.iter().all(beyond)
-        })
-    };
-    !separates(a, b) && !separates(b, a)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -171,11 +159,10 @@ mod tests {
     }
 
     #[test]
-    fn overlap_is_that_of_the_areas() {
-        let square = |x: f64| vec![[x, 0.0], [x + 1.0, 0.0], [x + 1.0, 1.0], [x, 1.0]];
-        assert!(overlap(&square(0.0), &square(0.9)), "overlapping");
-        assert!(!overlap(&square(0.0), &square(1.1)), "apart");
-        let diamond = vec![[1.6, 0.5], [2.1, 0.0], [2.6, 0.5], [2.1, 1.0]];
-        assert!(!overlap(&square(0.0), &diamond), "apart, though not by an axis of the square");
+    fn a_corner_is_clipped_off() {
+        let diamond = vec![[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]];
+        let quarter = clipped(diamond.clone(), [[0.0, 2.0], [0.0, 2.0]]);
+        assert!((area(&quarter) - 0.5).abs() < 1e-12, "a quarter of it: {quarter:?}");
+        assert!(clipped(diamond, [[0.6, 2.0], [0.6, 2.0]]).is_empty(), "beside it");
     }
 }

@@ -1,8 +1,8 @@
-//! The common stack of slabs: which members each slab holds, which of them must be integrated together,
-//! and the vertices and draws that follow, front to back.
+//! The common stack of slabs: which members each tile of each slab holds, and the vertices and draws that follow, front to
+//! back. What a tile holds is integrated together; tiles share no pixel, so nothing is drawn twice.
 
-use super::coverage::{Coverage, Shown, TileSet, Tiles};
-use super::polygons::{Polygon, Proxy, bounds, clipped, hull, overlap};
+use super::coverage::{Coverage, Rectangle, Sets, Shown, Tiles};
+use super::polygons::{Proxy, bounds, clipped};
 use super::{Kind, SATURATE_EVERY, SLOTS};
 use crate::view::View;
 
@@ -127,64 +127,39 @@ impl Stack {
         for slab in 0..spacing.slabs {
             let near = spacing.near_mm + f64::from(slab) * spacing.slab_mm();
             let far = near + spacing.slab_mm();
-            let mut present: Vec<(usize, Polygon)> = Vec::new();
-            for (index, member) in members.iter().enumerate() {
+            let mut sets = Sets::new(tiles, members.len());
+            for (index, (member, coverage)) in members.iter().zip(&coverages).enumerate() {
                 if member.proxy.depth[1] < near || member.proxy.depth[0] > far {
                     continue;
                 }
                 let polygon = member.proxy.polygon(view, near, far);
                 if polygon.is_empty() {
                     stack.off_screen += 1;
-                } else {
-                    present.push((index, polygon));
+                    continue;
+                }
+                let [low, high] = bounds(&polygon);
+                let Some(within) = tiles.between(low, high) else { continue };
+                for tile in tiles.each(within) {
+                    let shows = match coverage {
+                        Some(coverage) => coverage.has(slab, tile),
+                        None => !clipped(polygon.clone(), tiles.rectangle([tile[0]; 2], tile[1])).is_empty(),
+                    };
+                    sets.look(tile, index, shows);
                 }
             }
-            let drawn = stack.vertices.len();
-            for group in groups(present) {
-                let pieces = stack.pieces(slab, tiles, &coverages, &group);
-                if !pieces.is_empty() {
-                    stack.add(slab, members, &group, &pieces);
-                }
+            stack.tiles += sets.looked;
+            stack.tiles_skipped += sets.looked - sets.shown;
+            stack.occupied += u32::from(sets.shown > 0);
+            for (set, pieces) in sets.runs() {
+                stack.add(slab, members, &set, &pieces);
             }
-            stack.occupied += u32::from(stack.vertices.len() > drawn);
         }
         stack
     }
 
-    /// What of a group's outline may show anything, in convex pieces that share no pixel.
-    fn pieces(
-        &mut self,
-        slab: u32,
-        tiles: Tiles,
-        coverages: &[Option<Coverage>],
-        group: &Group,
-    ) -> Vec<Polygon> {
-        let [low, high] = bounds(&group.outline);
-        let Some(within) = tiles.between(low, high) else { return Vec::new() };
-        let mut set = TileSet::new(tiles);
-        for (member, [low, high]) in group.members.iter().zip(&group.bounds) {
-            match (&coverages[*member], tiles.between(*low, *high)) {
-                (Some(coverage), _) => coverage.add_to(slab, &mut set),
-                (None, Some(around)) => set.insert(around),
-                (None, None) => {}
-            }
-        }
-        let runs = set.runs(within);
-        let wide = |[first, last]: [u32; 2]| u64::from(last - first + 1);
-        let all = wide(within[0]) * wide(within[1]);
-        let shown: u64 = runs.iter().map(|(columns, _)| wide(*columns)).sum();
-        self.tiles += all;
-        self.tiles_skipped += all - shown;
-        if shown == all {
-            return vec![group.outline.clone()];
-        }
-        let piece = |(columns, row)| clipped(group.outline.clone(), tiles.rectangle(columns, row));
-        runs.into_iter().map(piece).filter(|piece| piece.len() > 2).collect()
-    }
-
-    fn add(&mut self, slab: u32, members: &[Member], group: &Group, pieces: &[Polygon]) {
-        let surfaces = group.members.iter().any(|&m| members[m].volume.is_none());
-        let mut volumes: Vec<_> = group.members.iter().filter_map(|&m| members[m].volume).collect();
+    fn add(&mut self, slab: u32, members: &[Member], set: &[usize], pieces: &[Rectangle]) {
+        let surfaces = set.iter().any(|&m| members[m].volume.is_none());
+        let mut volumes: Vec<_> = set.iter().filter_map(|&m| members[m].volume).collect();
         self.most_overlapping = self.most_overlapping.max(volumes.len());
         // By kind, so that fewer different shaders are made.
         volumes.sort_by_key(|&(fragment, kind, _)| (kind, fragment));
@@ -204,7 +179,7 @@ impl Stack {
         stage: Stage,
         volumes: &[(u32, Kind, usize)],
         surfaces: bool,
-        pieces: &[Polygon],
+        pieces: &[Rectangle],
     ) {
         let mut slots: Slots = [(Kind::None, 0); SLOTS];
         let mut fragments = [u32::MAX; SLOTS];
@@ -219,10 +194,9 @@ impl Stack {
         }) as u32;
         let first = self.vertices.len() as u32;
         let corner = |p: [f64; 2]| Vertex { ndc: p.map(|c| c as f32), slab, component };
-        for piece in pieces {
-            for pair in piece[1..].windows(2) {
-                self.vertices.extend([piece[0], pair[0], pair[1]].map(corner));
-            }
+        for [x, y] in pieces {
+            let corners = [[0, 0], [1, 0], [1, 1], [0, 0], [1, 1], [0, 1]];
+            self.vertices.extend(corners.map(|[i, j]: [usize; 2]| corner([x[i], y[j]])));
         }
         let end = self.vertices.len() as u32;
         match self.draws.last_mut() {
@@ -237,57 +211,5 @@ impl Stack {
                 self.draws.push(Draw { stage, slots, surfaces, vertices: first..end, slabs: [slab; 2] });
             }
         }
-    }
-}
-
-/// Members to be integrated together, and the convex polygon around them.
-struct Group {
-    members: Vec<usize>,
-    /// Of each member's own outline.
-    bounds: Vec<[[f64; 2]; 2]>,
-    outline: Polygon,
-}
-
-/// Members joined until no two outlines touch: then no pixel lies in two groups, and nothing is drawn
-/// twice.
-fn groups(present: Vec<(usize, Polygon)>) -> Vec<Group> {
-    let mut groups: Vec<Group> = Vec::new();
-    for (member, polygon) in present {
-        let mut joined = Group { members: vec![member], bounds: vec![bounds(&polygon)], outline: polygon };
-        while let Some(touching) = groups.iter().position(|g| overlap(&g.outline, &joined.outline)) {
-            let other = groups.swap_remove(touching);
-            joined.members.extend(other.members);
-            joined.bounds.extend(other.bounds);
-            joined.outline.extend(other.outline);
-            joined.outline = hull(joined.outline);
-        }
-        groups.push(joined);
-    }
-    groups
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn members_join_through_others_and_around_them() {
-        let square = |x: f64, y: f64| vec![[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]];
-        // 0 and 1 meet through 3; 4 touches neither, but lies in the hull of 5 and 6.
-        let present = vec![
-            (0, square(0.0, 0.0)),
-            (1, square(1.5, 0.0)),
-            (2, square(5.0, 0.0)),
-            (3, square(0.8, 0.0)),
-            (4, square(10.0, 2.5)),
-            (5, vec![[10.0, 0.0], [14.0, 0.0], [14.0, 0.5], [10.0, 0.5]]),
-            (6, vec![[13.0, 0.2], [14.0, 0.2], [14.0, 9.0], [13.0, 9.0]]),
-        ];
-        let mut found: Vec<Vec<usize>> = groups(present).into_iter().map(|g| g.members).collect();
-        for group in &mut found {
-            group.sort_unstable();
-        }
-        found.sort();
-        assert_eq!(found, [vec![0, 1, 3], vec![2], vec![4, 5, 6]], "joined groups");
     }
 }
