@@ -16,6 +16,8 @@ use crate::volume::{Affine, Body, Bricks, Face, Grid, Occupied, Point, Transfer,
 struct Fragment {
     texture: Arc<VolumeTexture>,
     view_from_voxel: Affine,
+    /// Two corners of what is drawn, in voxel space.
+    bounds: [Point; 2],
     planes: Vec<HalfSpace>,
     rounds: Vec<Round>,
     /// The faces, inwards, of prisms whose outside is kept.
@@ -194,8 +196,7 @@ impl Gathered {
             let mut solid = ConvexSolid::from_box(low, high);
             let view_from_unmoved = view.view_from_world * piece.pose;
             let view_from_voxel = view_from_unmoved * world_from_voxel;
-            let mut planes = box_planes(low, high, &view_from_voxel);
-            let (mut rounds, mut blocks) = (Vec::new(), Vec::new());
+            let (mut planes, mut rounds, mut blocks) = (Vec::new(), Vec::new(), Vec::new());
             for (cutter, side) in &piece.keep {
                 let (body, inside) = cutter.solid(*side);
                 let behind = |face: &Face| HalfSpace::new(&face.point, -face.normal);
@@ -249,6 +250,7 @@ impl Gathered {
             self.fragments.push(Fragment {
                 texture,
                 view_from_voxel,
+                bounds: [low, high],
                 planes,
                 rounds,
                 blocks,
@@ -332,6 +334,10 @@ impl Gathered {
                 let step = texture.texture_from_voxel.matrix()[(axis, axis)];
                 [g.x as f32, g.y as f32, g.z as f32, step as f32]
             };
+            let corner = |end: usize| {
+                let p = texture.texture_from_voxel.point(&fragment.bounds[end]);
+                [p.x as f32, p.y as f32, p.z as f32, 0.0]
+            };
             let mut channel = [0.0; 4];
             let mut stack = [0.0; 4];
             match texture.reading {
@@ -360,24 +366,14 @@ impl Gathered {
                 block_end: planes.len() as u32,
                 rest_scale: table.rest_scale,
                 rise_scale: table.rise_scale,
+                low: corner(0),
+                high: corner(1),
                 channel,
                 stack,
             });
         }
         (fragments, planes, rounds)
     }
-}
-
-/// The six faces of a voxel box, inwards, in view space.
-fn box_planes(low: Point, high: Point, view_from_voxel: &Affine) -> Vec<HalfSpace> {
-    let mut planes = Vec::with_capacity(12);
-    for axis in 0..3 {
-        let mut inward = Vector::zeros();
-        inward[axis] = 1.0;
-        planes.push(unit(HalfSpace::new(&low, inward).transformed(view_from_voxel)));
-        planes.push(unit(HalfSpace::new(&high, -inward).transformed(view_from_voxel)));
-    }
-    planes
 }
 
 /// The same half-space with a normal of length 1, so that its value is in mm.

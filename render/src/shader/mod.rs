@@ -84,7 +84,7 @@ pub fn mirrors() -> Vec<Mirror> {
         mirror!(crate::passes::slabs::gpu_data::Fragment as "Fragment" {
             u, v, w, gradient_x, gradient_y, gradient_z, table_scale, table_offset, table_row, unit_mm,
             plane_first, plane_end, round_first, round_end, block_first, block_end, rest_scale, rise_scale,
-            channel, stack,
+            low, high, channel, stack,
         }),
         mirror!(crate::passes::slabs::gpu_data::Round as "Round" {
             u, v, w, radius_mm, outside, pad_0, pad_1,
