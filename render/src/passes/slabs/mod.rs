@@ -33,10 +33,6 @@ pub(crate) const MAX_GAPS: usize = 8;
 /// Slabs between two looks for finished pixels.
 const SATURATE_EVERY: u32 = 6;
 
-/// A fragment as the shader reads it, and those that one draw integrates.
-const FRAGMENT_BYTES: usize = size_of::<gpu_data::Fragment>();
-const COMPONENT_BYTES: usize = SLOTS * FRAGMENT_BYTES;
-
 /// What a slot of the shader holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
@@ -138,8 +134,6 @@ struct Variant {
 pub(crate) struct Prepared {
     vertices: wgpu::Buffer,
     scene: wgpu::BindGroup,
-    /// Bytes from one component to the next.
-    stride: u32,
     surfaces: wgpu::BindGroup,
     /// The same without what is being added up, and its picture, where more fragments meet than one draw takes.
     summing: Option<(wgpu::BindGroup, wgpu::TextureView)>,
@@ -156,9 +150,8 @@ impl Slabs {
         };
         let read =
             |binding| buffer_entry(binding, wgpu::ShaderStages::FRAGMENT, Storage { read_only: true }, false);
-        let component = buffer_entry(0, wgpu::ShaderStages::FRAGMENT, wgpu::BufferBindingType::Uniform, true);
         let tables = wgpu::BindGroupLayoutEntry {
-            binding: 3,
+            binding: 4,
             visibility: wgpu::ShaderStages::FRAGMENT,
             ty: wgpu::BindingType::Texture {
                 sample_type: wgpu::TextureSampleType::Uint,
@@ -177,7 +170,7 @@ impl Slabs {
             count: None,
         });
         let volumes = group("slabs.volumes", &entries);
-        let scene = group("slabs.scene", &[component, read(1), read(2), tables]);
+        let scene = group("slabs.scene", &[read(0), read(1), read(2), read(3), tables]);
         let surfaces = group("slabs.surfaces", &[read(0), read(1), flat(2), flat(3), flat(4)]);
         let picture = target::picture_layout(gpu);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -234,40 +227,26 @@ impl Slabs {
         lists: Option<[&wgpu::Buffer; 2]>,
     ) -> Result<Prepared, GpuError> {
         let storage = wgpu::BufferUsages::STORAGE;
-        let alignment = gpu.device.limits().min_uniform_buffer_offset_alignment as usize;
-        let stride = COMPONENT_BYTES.next_multiple_of(alignment.max(1));
-        let mut components = vec![0; stride * inputs.stack.components.len()];
-        for (component, bytes) in inputs.stack.components.iter().zip(components.chunks_exact_mut(stride)) {
-            for (fragment, bytes) in component.iter().zip(bytes.chunks_exact_mut(FRAGMENT_BYTES)) {
-                if let Some(fragment) = inputs.fragments.get(*fragment as usize) {
-                    bytes.copy_from_slice(bytemuck::bytes_of(fragment));
-                }
-            }
-        }
-        let [components, planes, rounds] = [
-            upload(gpu, "slabs.components", &components, wgpu::BufferUsages::UNIFORM),
+        let components: Vec<[u32; SLOTS]> = inputs.stack.components.clone();
+        let [fragments, planes, rounds, components] = [
+            upload(gpu, "slabs.fragments", bytemuck::cast_slice(inputs.fragments), storage),
             upload(gpu, "slabs.planes", bytemuck::cast_slice(inputs.planes), storage),
             upload(gpu, "slabs.rounds", bytemuck::cast_slice(inputs.rounds), storage),
+            upload(gpu, "slabs.components", bytemuck::cast_slice(&components), storage),
         ];
         let scene = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("slabs.scene"),
             layout: &self.scene,
             entries: &[
-                entry(
-                    0,
-                    wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                        buffer: &components,
-                        offset: 0,
-                        size: wgpu::BufferSize::new(COMPONENT_BYTES as u64),
-                    }),
-                ),
+                entry(0, fragments.as_entire_binding()),
                 entry(1, planes.as_entire_binding()),
                 entry(2, rounds.as_entire_binding()),
-                entry(3, wgpu::BindingResource::TextureView(inputs.tables)),
+                entry(3, components.as_entire_binding()),
+                entry(4, wgpu::BindingResource::TextureView(inputs.tables)),
             ],
         });
         // Any buffer does where the shader never looks.
-        let [heads, layers] = lists.unwrap_or([&planes; 2]);
+        let [heads, layers] = lists.unwrap_or([&fragments; 2]);
         let bind_surfaces = |optical: &wgpu::TextureView| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("slabs.surfaces"),
@@ -324,7 +303,7 @@ impl Slabs {
             wgpu::BufferUsages::VERTEX,
         );
         gpu.check()?;
-        Ok(Prepared { vertices, scene, stride: stride as u32, surfaces, summing, draws })
+        Ok(Prepared { vertices, scene, surfaces, summing, draws })
     }
 
     fn bind_volumes(
@@ -382,7 +361,7 @@ impl Slabs {
                 buffers: &[Some(wgpu::VertexBufferLayout {
                     array_stride: size_of::<Vertex>() as u64,
                     step_mode: wgpu::VertexStepMode::Vertex,
-                    attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Uint32],
+                    attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Uint32, 2 => Uint32],
                 })],
             },
             primitive: Default::default(),
@@ -453,6 +432,7 @@ impl Slabs {
             });
             pass.set_scissor_rect(0, rows.start, target.size[0], rows.end - rows.start);
             pass.set_bind_group(0, frame, &[]);
+            pass.set_bind_group(2, &prepared.scene, &[]);
             pass.set_bind_group(3, surfaces, &[]);
             pass.set_vertex_buffer(0, prepared.vertices.slice(..));
             while let Some((variant, volumes, draw)) = prepared.draws.get(next) {
@@ -463,7 +443,6 @@ impl Slabs {
                 if let Some(pipeline) = self.pipelines.get(variant) {
                     pass.set_pipeline(pipeline);
                     pass.set_bind_group(1, volumes, &[]);
-                    pass.set_bind_group(2, &prepared.scene, &[draw.component * prepared.stride]);
                     pass.draw(draw.vertices.clone(), 0..1);
                 }
                 next += 1;

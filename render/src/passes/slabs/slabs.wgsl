@@ -67,9 +67,8 @@ const EVEN: f32 = 1e-2;
 // Beyond every place of a stack, mm.
 const FAR: f32 = 1e30;
 
-// The fragments that are integrated together.
 struct Component {
-    fragments: array<Fragment, 4>,
+    fragments: array<u32, 4>,
 }
 
 @group(1) @binding(0) var volume_0: texture_3d<f32>;
@@ -78,11 +77,12 @@ struct Component {
 @group(1) @binding(3) var volume_3: texture_3d<f32>;
 @group(1) @binding(4) var linear: sampler;
 
-// Uniform, since a software driver reads other buffers value by value.
-@group(2) @binding(0) var<uniform> component: Component;
+// Not uniform: with four fragments there, Mesa 22.3 takes 12 GB and a minute to compile the shader.
+@group(2) @binding(0) var<storage, read> fragments: array<Fragment>;
 @group(2) @binding(1) var<storage, read> planes: array<Form>;
 @group(2) @binding(2) var<storage, read> rounds: array<Round>;
-@group(2) @binding(3) var tables: texture_2d<u32>;
+@group(2) @binding(3) var<storage, read> components: array<Component>;
+@group(2) @binding(4) var tables: texture_2d<u32>;
 
 @group(3) @binding(0) var<storage, read> heads: array<u32>;
 @group(3) @binding(1) var<storage, read> layers: array<Layer>;
@@ -116,15 +116,17 @@ const KIND_STACKED_LIT: u32 = 5u;
 struct VertexOut {
     @builtin(position) position: vec4<f32>,
     @location(0) @interpolate(flat) slab: u32,
+    @location(1) @interpolate(flat) component: u32,
 }
 
 @vertex
 fn vs_main(
     @location(0) ndc: vec2<f32>,
     @location(1) slab: u32,
+    @location(2) component: u32,
 ) -> VertexOut {
     let zeta = f32(slab * frame.steps) * frame.step_mm;
-    return VertexOut(vec4<f32>(ndc, depth_of(zeta), 1.0), slab);
+    return VertexOut(vec4<f32>(ndc, depth_of(zeta), 1.0), slab, component);
 }
 
 // What of a fragment is asked at every place: see there.
@@ -213,22 +215,28 @@ fn add_gap(slot: ptr<function, Slot>, stretch: vec2<f32>) {
 // The part of [z0, z1] that a fragment's planes and inner round bodies keep, and the gaps of the others.
 fn open_slot(id: u32, e: vec3<f32>, z0: f32, z1: f32) -> Slot {
     var slot: Slot;
-    let u = along(component.fragments[id].u, e);
-    let v = along(component.fragments[id].v, e);
-    let w = along(component.fragments[id].w, e);
+    let u = along(fragments[id].u, e);
+    let v = along(fragments[id].v, e);
+    let w = along(fragments[id].w, e);
     slot.origin = vec3<f32>(u.x, v.x, w.x);
     slot.direction = vec3<f32>(u.y, v.y, w.y);
-    let before = slot.origin - component.fragments[id].low.xyz;
-    let beyond = component.fragments[id].high.xyz - slot.origin;
-    var open = vec2<f32>(z0, z1);
-    for (var axis = 0u; axis < 3u; axis++) {
-        open = clipped(open, vec2<f32>(before[axis], slot.direction[axis]));
-        open = clipped(open, vec2<f32>(beyond[axis], -slot.direction[axis]));
+    let before = slot.origin - fragments[id].low.xyz;
+    let beyond = fragments[id].high.xyz - slot.origin;
+    let still = slot.direction == vec3<f32>(0.0);
+    let ends = array<vec3<f32>, 2>(-before / slot.direction, beyond / slot.direction);
+    let enters = select(min(ends[0], ends[1]), vec3<f32>(-FAR), still);
+    let leaves = select(max(ends[0], ends[1]), vec3<f32>(FAR), still);
+    var open = vec2<f32>(
+        max(z0, max(enters.x, max(enters.y, enters.z))),
+        min(z1, min(leaves.x, min(leaves.y, leaves.z))),
+    );
+    if any(still & ((before < vec3<f32>(0.0)) | (beyond < vec3<f32>(0.0)))) {
+        open.y = open.x;
     }
-    for (var i = component.fragments[id].plane_first; i < component.fragments[id].plane_end; i++) {
+    for (var i = fragments[id].plane_first; i < fragments[id].plane_end; i++) {
         open = clipped(open, along(planes[i], e));
     }
-    for (var i = component.fragments[id].round_first; i < component.fragments[id].round_end; i++) {
+    for (var i = fragments[id].round_first; i < fragments[id].round_end; i++) {
         let u = along(rounds[i].u, e);
         let v = along(rounds[i].v, e);
         let w = along(rounds[i].w, e);
@@ -243,7 +251,7 @@ fn open_slot(id: u32, e: vec3<f32>, z0: f32, z1: f32) -> Slot {
         }
     }
     if GAPS {
-        for (var i = component.fragments[id].block_first; i < component.fragments[id].block_end; i += 5u) {
+        for (var i = fragments[id].block_first; i < fragments[id].block_end; i += 5u) {
             var inside = vec2<f32>(-FAR, FAR);
             for (var face = 0u; face < 5u; face++) {
                 inside = clipped(inside, along(planes[i + face], e));
@@ -255,12 +263,12 @@ fn open_slot(id: u32, e: vec3<f32>, z0: f32, z1: f32) -> Slot {
     slot.end = max(slot.start, open.y);
     slot.zeta = slot.start;
     slot.scalar = Scalar(
-        component.fragments[id].channel,
-        component.fragments[id].table_scale,
-        component.fragments[id].table_offset,
-        component.fragments[id].table_row,
-        component.fragments[id].rest_scale,
-        component.fragments[id].rise_scale,
+        fragments[id].channel,
+        fragments[id].table_scale,
+        fragments[id].table_offset,
+        fragments[id].table_row,
+        fragments[id].rest_scale,
+        fragments[id].rise_scale,
     );
     return slot;
 }
@@ -315,8 +323,8 @@ fn slice_value(volume: texture_3d<f32>, at: vec2<f32>, slice: f32, layers: f32) 
 // The texel value of a fragment at a place.
 fn value_at(kind: u32, channel: vec4<f32>, id: u32, volume: texture_3d<f32>, at: vec3<f32>) -> f32 {
     if kind == KIND_STACKED || kind == KIND_STACKED_LIT {
-        let slices = component.fragments[id].stack.x;
-        let layers = component.fragments[id].stack.y;
+        let slices = fragments[id].stack.x;
+        let layers = fragments[id].stack.y;
         let z = clamp(at.z * slices - 0.5, 0.0, slices - 1.0);
         let below = floor(z);
         let a = slice_value(volume, at.xy, below, layers);
@@ -330,7 +338,7 @@ fn value_at(kind: u32, channel: vec4<f32>, id: u32, volume: texture_3d<f32>, at:
 fn sampled(kind: u32, scalar: Scalar, id: u32, volume: texture_3d<f32>, at: vec3<f32>) -> Looked {
     if kind == KIND_COLOR {
         var here: Looked;
-        here.extinction = extinction_of(textureSampleLevel(volume, linear, at, 0.0), component.fragments[id].unit_mm);
+        here.extinction = extinction_of(textureSampleLevel(volume, linear, at, 0.0), fragments[id].unit_mm);
         return here;
     }
     let value = value_at(kind, scalar.channel, id, volume, at);
@@ -368,16 +376,16 @@ fn kept(slot: ptr<function, Slot>, a: f32, b: f32) -> vec3<f32> {
 
 // |n·v| of the gradient at a place, or -1 where the field is flat.
 fn facing(kind: u32, id: u32, volume: texture_3d<f32>, at: vec3<f32>, ray: vec3<f32>) -> f32 {
-    let channel = component.fragments[id].channel;
-    let x = vec3<f32>(component.fragments[id].gradient_x.w, 0.0, 0.0);
-    let y = vec3<f32>(0.0, component.fragments[id].gradient_y.w, 0.0);
-    let z = vec3<f32>(0.0, 0.0, component.fragments[id].gradient_z.w);
+    let channel = fragments[id].channel;
+    let x = vec3<f32>(fragments[id].gradient_x.w, 0.0, 0.0);
+    let y = vec3<f32>(0.0, fragments[id].gradient_y.w, 0.0);
+    let z = vec3<f32>(0.0, 0.0, fragments[id].gradient_z.w);
     let dx = value_at(kind, channel, id, volume, at + x) - value_at(kind, channel, id, volume, at - x);
     let dy = value_at(kind, channel, id, volume, at + y) - value_at(kind, channel, id, volume, at - y);
     let dz = value_at(kind, channel, id, volume, at + z) - value_at(kind, channel, id, volume, at - z);
-    let gradient = dx * component.fragments[id].gradient_x.xyz
-        + dy * component.fragments[id].gradient_y.xyz
-        + dz * component.fragments[id].gradient_z.xyz;
+    let gradient = dx * fragments[id].gradient_x.xyz
+        + dy * fragments[id].gradient_y.xyz
+        + dz * fragments[id].gradient_z.xyz;
     let size = length(gradient);
     if size < FLAT {
         return -1.0;
@@ -487,11 +495,12 @@ fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
     let z0 = f32(first) * frame.step_mm;
     let z1 = f32(first + frame.steps) * frame.step_mm;
 
+    let ids = components[in.component].fragments;
     var s0: Slot; var s1: Slot; var s2: Slot; var s3: Slot;
-    if KIND_0 != KIND_NONE { s0 = open_slot(0u, e, z0, z1); begin(KIND_0, &s0, 0u, volume_0); }
-    if KIND_1 != KIND_NONE { s1 = open_slot(1u, e, z0, z1); begin(KIND_1, &s1, 1u, volume_1); }
-    if KIND_2 != KIND_NONE { s2 = open_slot(2u, e, z0, z1); begin(KIND_2, &s2, 2u, volume_2); }
-    if KIND_3 != KIND_NONE { s3 = open_slot(3u, e, z0, z1); begin(KIND_3, &s3, 3u, volume_3); }
+    if KIND_0 != KIND_NONE { s0 = open_slot(ids[0], e, z0, z1); begin(KIND_0, &s0, ids[0], volume_0); }
+    if KIND_1 != KIND_NONE { s1 = open_slot(ids[1], e, z0, z1); begin(KIND_1, &s1, ids[1], volume_1); }
+    if KIND_2 != KIND_NONE { s2 = open_slot(ids[2], e, z0, z1); begin(KIND_2, &s2, ids[2], volume_2); }
+    if KIND_3 != KIND_NONE { s3 = open_slot(ids[3], e, z0, z1); begin(KIND_3, &s3, ids[3], volume_3); }
 
     // The next surface: a translucent layer or the opaque one, whichever is nearer.
     var layer = NO_LAYER;
@@ -526,10 +535,10 @@ fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
         }
 
         var sum = vec4<f32>(0.0);
-        if KIND_0 != KIND_NONE { sum += advance(KIND_0, &s0, 0u, volume_0, end, ray); }
-        if KIND_1 != KIND_NONE { sum += advance(KIND_1, &s1, 1u, volume_1, end, ray); }
-        if KIND_2 != KIND_NONE { sum += advance(KIND_2, &s2, 2u, volume_2, end, ray); }
-        if KIND_3 != KIND_NONE { sum += advance(KIND_3, &s3, 3u, volume_3, end, ray); }
+        if KIND_0 != KIND_NONE { sum += advance(KIND_0, &s0, ids[0], volume_0, end, ray); }
+        if KIND_1 != KIND_NONE { sum += advance(KIND_1, &s1, ids[1], volume_1, end, ray); }
+        if KIND_2 != KIND_NONE { sum += advance(KIND_2, &s2, ids[2], volume_2, end, ray); }
+        if KIND_3 != KIND_NONE { sum += advance(KIND_3, &s3, ids[3], volume_3, end, ray); }
         let part = absorbed_per_depth(sum.a);
         color += (1.0 - alpha) * part * sum.rgb;
         alpha += (1.0 - alpha) * part * sum.a;
@@ -565,26 +574,27 @@ fn fs_sum(in: VertexOut) -> @location(0) vec4<f32> {
     let ray = vec4<f32>(ray_direction(ndc), mm_per_zeta(ndc));
     let z0 = f32(in.slab * frame.steps) * frame.step_mm;
     let z1 = f32((in.slab + 1u) * frame.steps) * frame.step_mm;
+    let ids = components[in.component].fragments;
     var sum = vec4<f32>(0.0);
     if KIND_0 != KIND_NONE {
-        var slot = open_slot(0u, e, z0, z1);
-        begin(KIND_0, &slot, 0u, volume_0);
-        sum += advance(KIND_0, &slot, 0u, volume_0, z1, ray);
+        var slot = open_slot(ids[0], e, z0, z1);
+        begin(KIND_0, &slot, ids[0], volume_0);
+        sum += advance(KIND_0, &slot, ids[0], volume_0, z1, ray);
     }
     if KIND_1 != KIND_NONE {
-        var slot = open_slot(1u, e, z0, z1);
-        begin(KIND_1, &slot, 1u, volume_1);
-        sum += advance(KIND_1, &slot, 1u, volume_1, z1, ray);
+        var slot = open_slot(ids[1], e, z0, z1);
+        begin(KIND_1, &slot, ids[1], volume_1);
+        sum += advance(KIND_1, &slot, ids[1], volume_1, z1, ray);
     }
     if KIND_2 != KIND_NONE {
-        var slot = open_slot(2u, e, z0, z1);
-        begin(KIND_2, &slot, 2u, volume_2);
-        sum += advance(KIND_2, &slot, 2u, volume_2, z1, ray);
+        var slot = open_slot(ids[2], e, z0, z1);
+        begin(KIND_2, &slot, ids[2], volume_2);
+        sum += advance(KIND_2, &slot, ids[2], volume_2, z1, ray);
     }
     if KIND_3 != KIND_NONE {
-        var slot = open_slot(3u, e, z0, z1);
-        begin(KIND_3, &slot, 3u, volume_3);
-        sum += advance(KIND_3, &slot, 3u, volume_3, z1, ray);
+        var slot = open_slot(ids[3], e, z0, z1);
+        begin(KIND_3, &slot, ids[3], volume_3);
+        sum += advance(KIND_3, &slot, ids[3], volume_3, z1, ray);
     }
     return sum;
 }

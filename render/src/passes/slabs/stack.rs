@@ -23,6 +23,7 @@ pub(crate) struct Member {
 pub(crate) struct Vertex {
     pub(crate) ndc: [f32; 2],
     pub(crate) slab: u32,
+    pub(crate) component: u32,
 }
 
 /// What the slots of a draw hold: kind and texture of each.
@@ -44,8 +45,6 @@ pub(crate) enum Stage {
 pub(crate) struct Draw {
     pub(crate) stage: Stage,
     pub(crate) slots: Slots,
-    /// Index among the components.
-    pub(crate) component: u32,
     /// Whether surfaces may lie in it.
     pub(crate) surfaces: bool,
     pub(crate) vertices: std::ops::Range<u32>,
@@ -194,7 +193,7 @@ impl Stack {
             self.components.len() - 1
         }) as u32;
         let first = self.vertices.len() as u32;
-        let corner = |p: [f64; 2]| Vertex { ndc: p.map(|c| c as f32), slab };
+        let corner = |p: [f64; 2]| Vertex { ndc: p.map(|c| c as f32), slab, component };
         for [x, y] in pieces {
             let corners = [[0, 0], [1, 0], [1, 1], [0, 0], [1, 1], [0, 1]];
             self.vertices.extend(corners.map(|[i, j]: [usize; 2]| corner([x[i], y[j]])));
@@ -203,20 +202,13 @@ impl Stack {
         match self.draws.last_mut() {
             Some(last)
                 if stage == Stage::Whole
-                    && (last.stage, last.component, last.surfaces) == (stage, component, surfaces)
+                    && (last.stage, last.slots, last.surfaces) == (stage, slots, surfaces)
                     && slab - last.slabs[0] < SATURATE_EVERY =>
             {
                 (last.vertices.end, last.slabs[1]) = (end, slab);
             }
             _ => {
-                self.draws.push(Draw {
-                    stage,
-                    slots,
-                    component,
-                    surfaces,
-                    vertices: first..end,
-                    slabs: [slab; 2],
-                });
+                self.draws.push(Draw { stage, slots, surfaces, vertices: first..end, slabs: [slab; 2] });
             }
         }
     }
