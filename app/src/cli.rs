@@ -308,7 +308,7 @@ pub enum BenchName {
     Play,
     /// Observed order of error as spacing, grid and pixels are refined, on scenes of known pictures.
     Accuracy,
-    /// Frame time against error over spacings, textures and renderers, with a peer's beside ours.
+    /// Frame time against error over spacings, textures, terminations and renderers, with a peer's beside ours.
     Pareto,
     /// What skipping saves, on data: nothing skipped, a changed transfer function, a moved cut, seven ways to cut.
     Skips,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::cpu::Skips;
+use crate::cpu::{Finish, Skips};
 use crate::gather::{Caches, Counts, Gathered, Limits};
 use crate::gpu::{Gpu, GpuError, read_texture};
 use crate::image::FloatImage;
@@ -42,6 +42,8 @@ impl Quality {
     }
 }
 
+/// Where nothing else is asked for, at most this part of what lies behind a pixel is left out: 1/16 of a display step.
+const THROUGH: f32 = 1.0 / 4096.0;
 /// Sub-steps in a slab, unless a stack would have too many slabs.
 const STEPS: u32 = 12;
 /// What all textures may take at first. No interface tells how much memory there is: a small graphics card has it.
@@ -266,7 +268,8 @@ impl Renderer {
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         clear(&mut encoder, &target.picture_view);
         let nothing = Spacing { near_mm: 0.0, step_mm, steps: STEPS, slabs: 1 };
-        let mut whole = bind_frame(&gpu, &self.frame_layout, &frame_data(scene, &view, &nothing));
+        let mut whole =
+            bind_frame(&gpu, &self.frame_layout, &frame_data(scene, &view, &nothing, self.skips.finished));
         if let Some(mut spacing) = spacing {
             let mut stack = Stack::new(&gathered.members, &view, &spacing);
             if stack.most_overlapping > SLOTS {
@@ -274,7 +277,7 @@ impl Renderer {
                 spacing = spacing.single_steps();
                 stack = Stack::new(&gathered.members, &view, &spacing);
             }
-            let frame = frame_data(scene, &view, &spacing);
+            let frame = frame_data(scene, &view, &spacing, self.skips.finished);
             whole = bind_frame(&gpu, &self.frame_layout, &frame);
             let (fragments, planes, rounds) = gathered.to_gpu(&view, &spacing);
             let tables = self.caches.tables.texture(&gpu);
@@ -299,6 +302,7 @@ impl Renderer {
             stats.tiles = stack.tiles;
             stats.tiles_skipped = stack.tiles_skipped;
             stats.most_overlapping = stack.most_overlapping as u32;
+            let finished = self.skips.finished != Finish::Never;
             let most = gpu.caps().storage_bytes;
             let width = u64::from(size[0]);
             let mut bands: Vec<std::ops::Range<u32>> = std::iter::once(0..size[1]).collect();
@@ -339,7 +343,7 @@ impl Renderer {
                 let mut encoder =
                     gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
                 stats.saturate_looks +=
-                    self.slabs.draw(&gpu, &mut encoder, &ready, target, &bound, rows, self.skips.finished);
+                    self.slabs.draw(&gpu, &mut encoder, &ready, target, &bound, rows, finished);
                 gpu.submit(Some(encoder));
                 stats.draws += stack.draws.len() as u32;
                 stats.bands += 1;
@@ -408,7 +412,7 @@ impl Renderer {
     }
 }
 
-fn frame_data(scene: &Scene, view: &View, spacing: &Spacing) -> gpu_data::Frame {
+fn frame_data(scene: &Scene, view: &View, spacing: &Spacing, finished: Finish) -> gpu_data::Frame {
     let [r, g, b] = scene.background.map(|c| c as f32);
     gpu_data::Frame {
         size: view.size.map(|n| n as f32),
@@ -422,6 +426,14 @@ fn frame_data(scene: &Scene, view: &View, spacing: &Spacing) -> gpu_data::Frame 
         steps: spacing.steps,
         layer_most: 0,
         background: [r, g, b, 1.0],
+        through: match finished {
+            Finish::Never => 0.0,
+            Finish::WithQuality => THROUGH,
+            Finish::Below(part) => part,
+        },
+        pad_0: 0.0,
+        pad_1: 0.0,
+        pad_2: 0.0,
     }
 }
 

@@ -24,6 +24,10 @@ pub(crate) mod gpu_data {
         pub(crate) steps: u32,
         pub(crate) layer_most: u32,
         pub(crate) background: [f32; 4],
+        pub(crate) through: f32,
+        pub(crate) pad_0: f32,
+        pub(crate) pad_1: f32,
+        pub(crate) pad_2: f32,
     }
 
     /// `Form`: a value affine in (1, ndc x, ndc y), and its growth per mm of zeta.

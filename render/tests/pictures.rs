@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
-use render::cpu::{CpuRenderer, Instructions, Skips};
+use render::cpu::{CpuRenderer, Finish, Instructions, Skips};
 use render::gpu::{Gpu, GpuError};
 use render::image::{Difference, FloatImage};
 use render::recovery::RecoveringRenderer;
@@ -95,7 +95,8 @@ pub(crate) fn agrees(scene: &Scene, what: &str, psnr_db: f64, max: f64) -> Stats
 fn skips_agree(scene: &Scene, what: &str) {
     let mut renderer = renderer();
     let [skipped, whole] = [true, false].map(|skip| {
-        renderer.set_skips(Skips { empty: skip, finished: skip });
+        let finished = if skip { Finish::WithQuality } else { Finish::Never };
+        renderer.set_skips(Skips { empty: skip, finished });
         let stats = renderer.render(scene, SIZE, Quality::Good).unwrap();
         (renderer.read().unwrap(), stats)
     });
@@ -123,7 +124,7 @@ fn cpu_agrees(scene: &Scene, truth: &FloatImage, what: &str) {
     let (plain, _) = one.install(|| draw(Instructions::Plain, all, Quality::Finest));
     assert!(plain.pixels == picture.pixels, "{what}: other instructions and threads, other bytes");
     let (good, _) = draw(Instructions::Best, all, Quality::Good);
-    let (whole, _) = draw(Instructions::Best, Skips { empty: false, finished: false }, Quality::Good);
+    let (whole, _) = draw(Instructions::Best, Skips { empty: false, finished: Finish::Never }, Quality::Good);
     let d = good.difference(&whole, scene.background).unwrap();
     assert!(d.max <= 255.0 / 512.0, "{what}: skipping changed it by {} / 255", d.max);
 }

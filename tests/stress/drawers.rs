@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
+use render::TextureSummary;
 use render::cpu::CpuRenderer;
 use render::gpu::Gpu;
 use render::image::FloatImage;
@@ -42,7 +43,16 @@ fn by_cpu(scene: &Scene, size: [u32; 2], voxels: f64) -> Result<FloatImage, Stri
 }
 
 fn by_gpu(scene: &Scene, size: [u32; 2], voxels: f64) -> Result<FloatImage, String> {
+    Ok(with_textures(scene, size, voxels)?.0)
+}
+
+/// A picture by the GPU, with what its textures say of themselves.
+pub(super) fn with_textures(
+    scene: &Scene,
+    size: [u32; 2],
+    voxels: f64,
+) -> Result<(FloatImage, Vec<TextureSummary>), String> {
     let mut renderer = GPU.as_ref().map_err(Clone::clone)?.lock().unwrap_or_else(PoisonError::into_inner);
-    renderer.render(scene, size, Quality::Spacing(voxels)).map_err(|e| e.to_string())?;
-    renderer.read().map_err(|e| e.to_string())
+    let stats = renderer.render(scene, size, Quality::Spacing(voxels)).map_err(|e| e.to_string())?;
+    Ok((renderer.read().map_err(|e| e.to_string())?, stats.textures))
 }

@@ -14,19 +14,33 @@ const HAIR: f64 = 1e-3;
 
 /// Refuses a picture of which a channel is off by more than `most`/255, with the worst pixel.
 pub(super) fn right(scene: &Scene, picture: &FloatImage, most: f64) -> Result<(), String> {
+    between(std::slice::from_ref(scene), picture, most)
+}
+
+/// Refuses a picture of which a channel is more than `most`/255 off what lies between the pictures of `scenes`, with the
+/// worst pixel.
+pub(super) fn between(scenes: &[Scene], picture: &FloatImage, most: f64) -> Result<(), String> {
     let size = [picture.width, picture.height];
-    let exact = truth(scene, size)?;
-    let Some(wrong) = worst(picture, &exact) else { return Ok(()) };
-    if wrong.apart <= most {
+    let mut around = Vec::new();
+    for scene in scenes {
+        around.push(truth(scene, size)?);
+    }
+    if within(&around, picture, most).is_ok() {
         return Ok(());
     }
-    let mut around = vec![exact];
-    for [x, y] in [[1.0, 0.4], [-0.4, 1.0], [-1.0, -0.4], [0.4, -1.0]] {
-        around.push(truth(&beside(scene, size, [x * HAIR, y * HAIR])?, size)?);
+    for scene in scenes {
+        for [x, y] in [[1.0, 0.4], [-0.4, 1.0], [-1.0, -0.4], [0.4, -1.0]] {
+            around.push(truth(&beside(scene, size, [x * HAIR, y * HAIR])?, size)?);
+        }
     }
+    within(&around, picture, most)
+}
+
+/// Refuses a picture of which a channel is more than `most`/255 off what lies between those `around`.
+fn within(around: &[FloatImage], picture: &FloatImage, most: f64) -> Result<(), String> {
     let mut low = around[0].clone();
     let mut high = around[0].clone();
-    for other in &around {
+    for other in around {
         for ((low, high), p) in low.pixels.iter_mut().zip(&mut high.pixels).zip(&other.pixels) {
             for c in 0..4 {
                 low[c] = low[c].min(p[c]);

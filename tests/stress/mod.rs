@@ -15,6 +15,7 @@ mod pictures;
 mod random;
 mod shapes;
 mod solids;
+mod textures;
 
 use random::Random;
 

@@ -1,6 +1,6 @@
 //! Random scenes, drawn by every renderer beside the reference.
 
-use render::scene::Scene;
+use render::scene::{Scene, Shading};
 use render::volume::{Affine, Cutter, Side, Vector};
 
 use super::cases::{self, Case, Contents};
@@ -109,6 +109,18 @@ fn a_surface_in_the_plane_of_a_cut() {
         let mut item = shapes::item(random, positions, triangles);
         item.pose = Affine::identity();
         meshes.push(item);
+        check(random, &case)
+    });
+}
+
+/// Light falls by the gradient, of which there is none in flat parts and at jumps of the samples.
+#[test]
+fn lit_volumes_cut_and_with_surfaces_in_them() {
+    each("lit volumes", 40, |random| {
+        let mut case = cases::any(random, Contents { volumes: 2, cut: true, meshes: 1 });
+        for volume in &mut case.scene.volumes {
+            volume.shading = Shading::Lit;
+        }
         check(random, &case)
     });
 }

@@ -39,7 +39,7 @@ const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 440.0;
 /// Left, top, right and bottom of the frame.
 const FRAME: [f64; 4] = [70.0, 40.0, 560.0, 390.0];
-/// Told apart with the usual kinds of colour blindness (Okabe and Ito, 2008).
+/// Told apart with the usual kinds of colour blindness (Okabe and Ito, 2008). Series beyond them have hollow dots.
 const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
 impl Chart {
@@ -95,8 +95,9 @@ impl Chart {
         }
         for (i, series) in self.series.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
+            let fill = if (i / COLOURS.len()).is_multiple_of(2) { colour } else { "white" };
             let row = upper + 10.0 + 20.0 * i as f64;
-            lines.push(dot([right + 18.0, row], colour));
+            lines.push(dot([right + 18.0, row], colour, fill));
             lines.push(text([right + 28.0, row + 4.0], "start", &series.name));
             if self.joined {
                 let points = series.points.iter().filter(finite);
@@ -105,7 +106,7 @@ impl Chart {
                 lines.push(format!("<polyline points=\"{path}\" fill=\"none\" stroke=\"{colour}\"/>"));
             }
             for (px, py, label) in series.points.iter().filter(finite) {
-                lines.push(dot([x(*px), y(*py)], colour));
+                lines.push(dot([x(*px), y(*py)], colour, fill));
                 lines.push(text([x(*px) + 7.0, y(*py) - 5.0], "start", label));
             }
         }
@@ -122,8 +123,8 @@ fn decades(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     if low > high { [0.0, 1.0] } else { [low, high.max(low + 1.0)] }
 }
 
-fn dot([x, y]: [f64; 2], colour: &str) -> String {
-    format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4.5\" fill=\"{colour}\"/>")
+fn dot([x, y]: [f64; 2], colour: &str, fill: &str) -> String {
+    format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{fill}\" stroke=\"{colour}\"/>")
 }
 
 fn text([x, y]: [f64; 2], anchor: &str, what: &str) -> String {
@@ -181,6 +182,17 @@ mod tests {
             .collect();
         assert_eq!(heights, [390.0, 215.0, 40.0], "bottom, middle and top; nought has no logarithm");
         assert!(svg.contains("<polyline points=\"70.0,390.0 70.0,215.0 70.0,40.0\""), "{svg}");
+    }
+
+    #[test]
+    fn no_two_of_twelve_series_look_alike() {
+        let one = |i: usize| Series { name: i.to_string(), points: Vec::new() };
+        let (title, x, y) = ("t".to_owned(), "ms".to_owned(), "dB".to_owned());
+        let series = (0..12).map(one).collect();
+        let svg = Chart { title, x, y, y_scale: Scale::Linear, joined: true, series }.svg();
+        let looks = svg.lines().filter(|l| l.starts_with("<circle")).filter_map(|l| l.split("fill").nth(1));
+        let looks: std::collections::BTreeSet<&str> = looks.collect();
+        assert_eq!(looks.len(), 12, "{looks:?}");
     }
 
     #[test]

@@ -78,18 +78,30 @@ pub enum CpuError {
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// What may be skipped. All is; for tests and measurements each can be had.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Skips {
     /// Bricks that the transfer function makes clear.
     pub empty: bool,
     /// What lies behind a pixel that lets next to nothing through.
-    pub finished: bool,
+    pub finished: Finish,
 }
 
 impl Default for Skips {
     fn default() -> Self {
-        Self { empty: true, finished: true }
+        Self { empty: true, finished: Finish::default() }
     }
+}
+
+/// When a pixel is finished, so that nothing behind it is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Finish {
+    /// At the end of its ray.
+    Never,
+    /// When it lets so little through that it is below what the quality's steps are off by.
+    #[default]
+    WithQuality,
+    /// When it lets less than this part of the light behind through, 0 to 1.
+    Below(f32),
 }
 
 /// Which instructions are used. All give the same bytes.
@@ -240,10 +252,13 @@ impl CpuRenderer {
 
     /// What may be left out behind a pixel falls with the error of the steps, which goes with their square.
     fn dark(&self, quality: Quality) -> f32 {
-        if !self.skips.finished {
-            return 0.0;
+        match self.skips.finished {
+            Finish::Never => 0.0,
+            Finish::WithQuality => {
+                (quality.voxels().powi(2) / 1024.0).clamp(1.0 / 65536.0, 1.0 / 512.0) as f32
+            }
+            Finish::Below(through) => through,
         }
-        (quality.voxels().powi(2) / 1024.0).clamp(1.0 / 65536.0, 1.0 / 512.0) as f32
     }
 
     /// Makes ready what is not, lets go of what the scene does not show. For each volume of the scene its place among

@@ -78,7 +78,7 @@ pub fn mirrors() -> Vec<Mirror> {
     vec![
         mirror!(crate::view::gpu_data::Frame as "Frame" {
             size, band_first, layer_capacity, lens, perspective, near_mm, depth_mm, step_mm, steps, layer_most,
-            background,
+            background, through, pad_0, pad_1, pad_2,
         }),
         mirror!(crate::view::gpu_data::Form as "Form" { at_near, per_mm }),
         mirror!(crate::passes::slabs::gpu_data::Fragment as "Fragment" {

@@ -127,7 +127,12 @@ pub(crate) fn encode(plan: &Plan) -> Result<Texels, GpuError> {
 /// A scalar in two planes: the sum of red and green, weighted, is the value, also between texels.
 fn two_planes(plan: &Plan, begin: std::time::Instant) -> Result<Texels, GpuError> {
     let extent = Extent3::new(plan.texels().map(|n| n as u32)).map_err(failed)?;
-    let made = encode_two_planes(&values(plan), extent, plan.key.grid.range()).map_err(failed)?;
+    let mut range = plan.key.grid.range();
+    if range[0] == range[1] {
+        // One value is an end of a range that has a width, and so exact.
+        range = if range[0] < 0.0 { [range[0], 1.0] } else { [-1.0, range[0]] };
+    }
+    let made = encode_two_planes(&values(plan), extent, range).map_err(failed)?;
     let Scales { offset, coarse, residual } = made.scales;
     let [x, y, z] = extent.sizes();
     Ok(Texels {

@@ -1,7 +1,7 @@
 //! Every change: what it does, and what it refuses.
 
 use super::*;
-use crate::case::Source;
+use crate::case::{Case, Source, labels};
 use render::volume::{ControlPoint, Vector};
 
 fn volume(id: &str) -> Box<Volume> {

@@ -68,7 +68,7 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
         BenchName::Pareto => {
             let case = args.data.as_deref().filter(|path| input::is_case(path));
             pareto::run(&data(args)?, case, args.peer.as_deref(), &mut bench)?;
-            vec![("pareto.svg", pareto::chart(&bench.rows))]
+            pareto::charts(&bench.rows)
         }
     };
     if let Some(folder) = &args.plot {

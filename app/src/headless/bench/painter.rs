@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use ::render::cpu::CpuRenderer;
+use ::render::cpu::{CpuRenderer, Finish, Skips};
 use ::render::gpu::Gpu;
 use ::render::image::FloatImage;
 use ::render::reference;
@@ -35,6 +35,14 @@ pub(super) trait Painter {
         &[TextureFormat::Auto]
     }
 
+    /// The ways to finish pixels that are worth comparing; none is told where it is fixed.
+    fn terminations(&self) -> &'static [Option<Finish>] {
+        &[None]
+    }
+
+    /// Finishes pixels by one of its [`Painter::terminations`] from now on.
+    fn terminate(&mut self, _finish: Finish) {}
+
     /// A picture of `size` pixels with sub-steps of `spacing` voxels of the finest volume.
     fn paint(&mut self, scene: &Scene, size: [u32; 2], spacing: f64) -> Result<Painted, Failure>;
 }
@@ -58,8 +66,8 @@ impl Painter for OnGpu {
     }
 
     fn formats(&self) -> &'static [TextureFormat] {
-        use TextureFormat::{Bc3, Bc4, R16, R32f, Rgba8};
-        &[R16, R32f, Bc4, Rgba8, Bc3]
+        use TextureFormat::{Bc3, Bc4, Bc5, Bc7, R16, R32f, Rgba8};
+        &[R16, R32f, Bc4, Bc5, Rgba8, Bc3, Bc7]
     }
 
     fn paint(&mut self, scene: &Scene, size: [u32; 2], spacing: f64) -> Result<Painted, Failure> {
@@ -74,6 +82,17 @@ struct OnCpu(CpuRenderer);
 impl Painter for OnCpu {
     fn name(&self) -> &'static str {
         "cpu"
+    }
+
+    fn terminations(&self) -> &'static [Option<Finish>] {
+        use Finish::{Below, Never, WithQuality};
+        const BELOW: [Finish; 4] =
+            [Below(1.0 / 65536.0), Below(1.0 / 1024.0), Below(1.0 / 256.0), Below(1.0 / 64.0)];
+        &[Some(WithQuality), Some(Never), Some(BELOW[0]), Some(BELOW[1]), Some(BELOW[2]), Some(BELOW[3])]
+    }
+
+    fn terminate(&mut self, finish: Finish) {
+        self.0.set_skips(Skips { finished: finish, ..Skips::default() });
     }
 
     fn paint(&mut self, scene: &Scene, size: [u32; 2], spacing: f64) -> Result<Painted, Failure> {

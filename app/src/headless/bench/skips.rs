@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use ::render::cpu::{CpuRenderer, Skips};
+use ::render::cpu::{CpuRenderer, Finish, Skips};
 use ::render::gpu::Gpu;
 use ::render::image::FloatImage;
 use ::render::renderer::{Quality, Renderer, Stats};
@@ -87,9 +87,9 @@ fn on_and_off(
 ) -> Result<(), Failure> {
     let settings = [
         Skips::default(),
-        Skips { empty: false, finished: true },
-        Skips { empty: true, finished: false },
-        Skips { empty: false, finished: false },
+        Skips { empty: false, ..Skips::default() },
+        Skips { finished: Finish::Never, ..Skips::default() },
+        Skips { empty: false, finished: Finish::Never },
     ];
     let mut drawers = Vec::with_capacity(settings.len());
     for skips in settings {

@@ -1,7 +1,10 @@
 //! The brush: a ball of paint, drawn along the way of the pointer, in the place where the piece under it came from.
 
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
 use render::scene::Piece;
-use render::volume::{Affine, Point};
+use render::volume::{Affine, Body, Point};
 
 use crate::case::label_grid::LabelGrid;
 use crate::case::labels::{Bricks, EDGE};
@@ -9,7 +12,10 @@ use crate::case::labels::{Bricks, EDGE};
 /// A stroke, from press to release. It paints the piece that it began on, wherever it goes.
 #[derive(Debug, Clone)]
 pub(super) struct Stroke {
-    piece: Piece,
+    /// Of the piece: `unmoved_from_world`.
+    unmoved_from_world: Affine,
+    /// Whether the piece is inside of each.
+    bodies: Vec<(Body, bool)>,
     /// `world_from_patient` of the volume.
     pose: Affine,
     at: Point,
@@ -19,8 +25,9 @@ pub(super) struct Stroke {
 
 impl Stroke {
     /// A stroke that begins at a world place on a piece of the volume with this pose.
-    pub(super) fn new(piece: Piece, pose: Affine, at: Point) -> Self {
-        Self { piece, pose, at, changed: Bricks::new() }
+    pub(super) fn new(piece: &Piece, pose: Affine, at: Point) -> Self {
+        let bodies = piece.keep.iter().map(|(cutter, side)| cutter.solid(*side)).collect();
+        Self { unmoved_from_world: piece.pose.inverse(), bodies, pose, at, changed: Bricks::new() }
     }
 
     /// Paints from where it is to a world place: the bricks that this changed.
@@ -30,20 +37,28 @@ impl Stroke {
     pub(super) fn to(&mut self, labels: &LabelGrid, place: Point, radius_mm: f64, label: u16) -> Bricks {
         let along = place - self.at;
         let steps = (along.norm() / (0.5 * radius_mm).max(0.05)).ceil().clamp(1.0, 2000.0) as usize;
-        let mut bricks = Bricks::new();
+        let mut touched = BTreeSet::new();
         for step in 1..=steps {
             let p = self.at + along * (step as f64 / steps as f64);
-            self.dab(labels, &p, radius_mm, label, &mut bricks);
+            self.dab(labels, &p, radius_mm, label, &mut touched);
         }
         self.at = place;
-        bricks
+        let brick = |at: [usize; 3]| Some((at, Arc::clone(self.changed.get(&at)?)));
+        touched.into_iter().filter_map(brick).collect()
     }
 
-    fn dab(&mut self, labels: &LabelGrid, p: &Point, radius_mm: f64, label: u16, into: &mut Bricks) {
+    fn dab(
+        &mut self,
+        labels: &LabelGrid,
+        p: &Point,
+        radius_mm: f64,
+        label: u16,
+        touched: &mut BTreeSet<[usize; 3]>,
+    ) {
         let grid = &labels.grid;
         let unmoved_from_voxel = self.pose * *grid.world_from_voxel();
         let voxel_from_unmoved = unmoved_from_voxel.inverse();
-        let centre = self.piece.pose.inverse().point(p);
+        let centre = self.unmoved_from_world.point(p);
         let in_voxels = voxel_from_unmoved.point(&centre);
         let rows = voxel_from_unmoved.linear();
         // How far the ball reaches along each voxel axis; at least to the nearest sample.
@@ -60,33 +75,30 @@ impl Stroke {
                     let sample = Point::new(x as f64, y as f64, z as f64);
                     let there = unmoved_from_voxel.point(&sample);
                     let in_ball = (there - centre).norm() <= radius_mm || sample == nearest;
-                    if in_ball && self.piece.keep.iter().all(|(cutter, side)| cutter.keeps(*side, &there)) {
-                        self.put(labels, [x, y, z], label, into);
+                    if in_ball && self.bodies.iter().all(|(body, inside)| body.holds(&there) == *inside) {
+                        self.put(labels, [x, y, z], label, touched);
                     }
                 }
             }
         }
     }
 
-    fn put(&mut self, labels: &LabelGrid, at: [usize; 3], label: u16, into: &mut Bricks) {
+    fn put(&mut self, labels: &LabelGrid, at: [usize; 3], label: u16, touched: &mut BTreeSet<[usize; 3]>) {
         let place = at.map(|i| i / EDGE);
         let [i, j, k] = at.map(|i| i % EDGE);
         let local = i + EDGE * (j + EDGE * k);
         let brick = self.changed.entry(place).or_insert_with(|| labels.brick(place));
-        if brick[local] == label {
-            return;
+        if brick[local] != label {
+            // A copy where the case has this brick already, the first time only.
+            Arc::make_mut(brick)[local] = label;
+            touched.insert(place);
         }
-        let mut changed = brick.to_vec();
-        changed[local] = label;
-        *brick = changed.into();
-        into.insert(place, std::sync::Arc::clone(brick));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
-    use std::sync::Arc;
 
     use super::*;
     use crate::case::label_grid::LabelGrids;
@@ -118,7 +130,7 @@ mod tests {
     #[test]
     fn a_dab_is_a_ball_and_a_stroke_a_rod_with_round_ends() {
         let from = Point::new(12.0, 20.0, 20.0);
-        let mut stroke = Stroke::new(Piece::whole(), Affine::identity(), from);
+        let mut stroke = Stroke::new(&Piece::whole(), Affine::identity(), from);
         let first = stroke.to(&empty(), from, 6.0, 3);
         for z in 0..N {
             for y in 0..N {
@@ -150,7 +162,7 @@ mod tests {
         let piece = Piece { keep: vec![(cutter, Side::Plus)], pose: away };
         let centre = Point::new(21.0, 20.0, 20.0);
         let at = away.point(&centre);
-        let bricks = Stroke::new(piece, Affine::identity(), at).to(&empty(), at, 5.0, 1);
+        let bricks = Stroke::new(&piece, Affine::identity(), at).to(&empty(), at, 5.0, 1);
         let places = painted(&bricks);
         assert!(places.iter().all(|p| p.x >= 20.0 && (p - centre).norm() < 5.0 + 1e-9), "its own side only");
         assert!(places.len() > 200, "but all of that: {}", places.len());
@@ -159,8 +171,23 @@ mod tests {
     #[test]
     fn a_brush_finer_than_the_labels_paints_the_nearest() {
         let at = Point::new(3.3, 4.4, 5.4);
-        let bricks = Stroke::new(Piece::whole(), Affine::identity(), at).to(&empty(), at, 0.05, 1);
+        let bricks = Stroke::new(&Piece::whole(), Affine::identity(), at).to(&empty(), at, 0.05, 1);
         assert_eq!(painted(&bricks), [Point::new(3.0, 4.0, 5.0)], "one sample");
+    }
+
+    #[test]
+    fn bricks_that_a_stroke_gave_away_do_not_change_as_it_goes_on() {
+        let at = Point::new(4.0, 4.0, 4.0);
+        let mut stroke = Stroke::new(&Piece::whole(), Affine::identity(), at);
+        let first = stroke.to(&empty(), at, 2.0, 1);
+        let before = painted(&first).len();
+        let second = stroke.to(&empty(), Point::new(10.0, 10.0, 10.0), 2.0, 1);
+        assert_eq!(painted(&first).len(), before, "the case keeps it for undo");
+        assert!(painted(&second).len() > before, "the same brick goes on");
+        assert!(
+            stroke.to(&empty(), Point::new(10.0, 10.0, 10.0), 2.0, 1).is_empty(),
+            "nothing more to paint"
+        );
     }
 
     #[test]
@@ -170,7 +197,7 @@ mod tests {
         case.volumes.push(Volume::new("ct", Source::Builtin("hip/ct".to_owned()), transfer));
         case.labels.push(LabelSet::new("l", "ct", None));
         let paint = |case: &mut Case, at: Point, labels: &LabelGrid| {
-            let bricks = Stroke::new(Piece::whole(), Affine::identity(), at).to(labels, at, 3.0, 1);
+            let bricks = Stroke::new(&Piece::whole(), Affine::identity(), at).to(labels, at, 3.0, 1);
             let change = LabelChange::Paint(bricks);
             edit::apply(case, Edit::ChangeLabels { id: "l".to_owned(), change }).expect("painted");
         };

@@ -41,7 +41,7 @@ impl LabelsTool {
         let Some(labels) = ctx.assets.labels(ctx.case, set) else { return };
         if event.phase == Phase::Press {
             let piece = crate::sections::piece_at(ctx.case, ctx.assets, volume, &event.place);
-            self.stroke = piece.map(|piece| Stroke::new(piece, volume.pose, event.place));
+            self.stroke = piece.map(|piece| Stroke::new(&piece, volume.pose, event.place));
         }
         let Some(stroke) = &mut self.stroke else { return };
         let label = if self.erases { 0 } else { self.label };

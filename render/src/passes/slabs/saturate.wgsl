@@ -1,12 +1,9 @@
-// Finished pixels: writes the nearest depth where the picture lets less through than THROUGH, so that the
+// Finished pixels: writes the nearest depth where the picture lets less through than the frame says, so that the
 // depth test drops every later slab there.
 
 #import "shared/frame.wgsl"
 
 @group(1) @binding(0) var picture: texture_2d<f32>;
-
-// At most this part of what lies behind is left out: 1/16 of a display step.
-const THROUGH: f32 = 1.0 / 4096.0;
 
 @vertex
 fn vs_main(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
@@ -16,7 +13,7 @@ fn vs_main(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
 
 @fragment
 fn fs_main(@builtin(position) position: vec4<f32>) {
-    if textureLoad(picture, vec2<u32>(position.xy), 0).a < 1.0 - THROUGH {
+    if textureLoad(picture, vec2<u32>(position.xy), 0).a < 1.0 - frame.through {
         discard;
     }
 }

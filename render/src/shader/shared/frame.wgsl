@@ -27,6 +27,11 @@ struct Frame {
     // Most translucent layers on one pixel.
     layer_most: u32,
     background: vec4<f32>,
+    // A pixel that lets less than this through is finished.
+    through: f32,
+    pad_0: f32,
+    pad_1: f32,
+    pad_2: f32,
 }
 
 struct Form {

@@ -31,6 +31,19 @@ pub(super) struct Known {
 }
 
 impl Known {
+    /// The format of its texture.
+    pub(super) fn format(&self) -> TextureFormat {
+        self.scene.volumes.first().map_or(TextureFormat::Auto, |volume| volume.texture)
+    }
+
+    /// The same from a texture of another format.
+    pub(super) fn with_texture(mut self, format: TextureFormat) -> Self {
+        for volume in &mut self.scene.volumes {
+            volume.texture = format;
+        }
+        self
+    }
+
     /// What is seen at a place of the picture, -1 to 1 from the left and from the bottom.
     pub(super) fn seen(&self, [u, v]: [f64; 2]) -> [f64; 4] {
         let eye = Point::new(0.0, -EYE_MM, 0.0);

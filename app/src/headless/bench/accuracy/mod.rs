@@ -8,6 +8,9 @@
 //!
 //! Pixels are refined at a fixed field of view: the mean of a picture's pixels in each of 8×8 cells against the mean
 //! of what is seen there, a midpoint rule of order 2.
+//!
+//! Textures that lose something have a floor. That it is theirs and not of the steps is shown by a second error, against
+//! the same texture at the finest steps: it falls on where the error stays.
 
 mod known;
 mod ray;
@@ -16,6 +19,7 @@ use std::sync::Arc;
 
 use ::render::gpu::Gpu;
 use ::render::image::FloatImage;
+use ::render::scene::TextureFormat;
 use rayon::prelude::*;
 use serde_json::json;
 
@@ -28,7 +32,11 @@ use crate::headless::plot::{Chart, Scale, Series};
 /// The pictures whose slices or voxels are refined; pixels.
 const SIZE: u32 = 64;
 /// Slice spacings, voxels.
-const SPACINGS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.125, 0.0625];
+const SPACINGS: [f64; 9] = [2.0, 1.0, 0.5, 0.25, 0.125, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0];
+/// Those that a texture's floor is looked for with.
+const COARSE: [f64; 5] = [2.0, 1.0, 0.5, 0.25, 0.125];
+/// Halvings that an order is also told over: steps that never leave a cell are not halved by each.
+const HALVINGS: usize = 4;
 /// Voxels a side.
 const COUNTS: [usize; 5] = [8, 16, 32, 64, 128];
 /// Pixels a side.
@@ -51,50 +59,106 @@ pub(super) fn run(bench: &mut Bench) -> Result<(), Failure> {
     let gpu = Arc::new(Gpu::headless()?);
     for make in MAKERS {
         let mut painter = make(&gpu)?;
-        for known in known::for_spacing()? {
-            let truth = truth(&known);
-            let spacings = if painter.has_spacing() { &SPACINGS[..] } else { &[FINE] };
-            let mut last = None;
-            for &spacing in spacings {
-                let picture = painter.paint(&known.scene, [SIZE; 2], spacing)?.picture;
-                report(bench, &*painter, &known, ("spacing", spacing), apart(&picture, &truth), &mut last)?;
-            }
-        }
-        let mut last = None;
-        for count in COUNTS {
-            let known = known::ball(count)?;
-            let picture = painter.paint(&known.scene, [SIZE; 2], FINE)?.picture;
-            let error = apart(&picture, &truth(&known));
-            report(bench, &*painter, &known, ("grid", 1.0 / count as f64), error, &mut last)?;
-        }
-        let known = known::product()?;
-        let truth = cells(&known);
-        let mut last = None;
-        for side in SIDES {
-            let picture = painter.paint(&known.scene, [side; 2], FINE)?.picture;
-            let error = apart(&means(&picture), &truth);
-            report(bench, &*painter, &known, ("pixels", 1.0 / f64::from(side)), error, &mut last)?;
+        refine(&mut *painter, bench)?;
+        for &format in painter.formats().iter().filter(|format| is_lossy(**format)) {
+            with_texture(&mut *painter, format, bench)?;
         }
     }
     Ok(())
 }
 
-/// A row: the error, and the order between it and the `last` one.
-fn report(
-    bench: &mut Bench,
-    painter: &dyn Painter,
-    known: &Known,
-    (refined, width): (&str, f64),
-    [rms, max]: [f64; 2],
-    last: &mut Option<(f64, f64)>,
-) -> Result<(), Failure> {
-    let order = last.and_then(|(wider, error)| order((wider, error), (width, rms)));
-    *last = Some((width, rms));
-    bench.report(json!({
-        "bench": "accuracy", "renderer": painter.name(), "refined": refined, "scene": known.name,
-        "width": width, "rms_error_255": rms, "max_error_255": max, "order": order,
-        "line": format!("{}, {}", painter.name(), known.name),
-    }))
+/// Scenes as exact as the renderer has them.
+fn refine(painter: &mut dyn Painter, bench: &mut Bench) -> Result<(), Failure> {
+    for known in known::for_spacing()? {
+        let truth = truth(&known);
+        let spacings = if painter.has_spacing() { &SPACINGS[..] } else { &[FINE] };
+        let mut line = Line::new(&*painter, &known, "spacing");
+        for &spacing in spacings {
+            let picture = painter.paint(&known.scene, [SIZE; 2], spacing)?.picture;
+            line.report(bench, spacing, apart(&picture, &truth), None)?;
+        }
+    }
+    let mut line = Line::new(&*painter, &known::ball(COUNTS[0])?, "grid");
+    for count in COUNTS {
+        let known = known::ball(count)?;
+        let picture = painter.paint(&known.scene, [SIZE; 2], FINE)?.picture;
+        line.report(bench, 1.0 / count as f64, apart(&picture, &truth(&known)), None)?;
+    }
+    let known = known::product()?;
+    let truth = cells(&known);
+    let mut line = Line::new(&*painter, &known, "pixels");
+    for side in SIDES {
+        let picture = painter.paint(&known.scene, [side; 2], FINE)?.picture;
+        line.report(bench, 1.0 / f64::from(side), apart(&means(&picture), &truth), None)?;
+    }
+    Ok(())
+}
+
+/// The same with a texture: the error, and that of the steps alone.
+fn with_texture(painter: &mut dyn Painter, format: TextureFormat, bench: &mut Bench) -> Result<(), Failure> {
+    for known in known::for_spacing()? {
+        let known = known.with_texture(format);
+        let truth = truth(&known);
+        let limit = painter.paint(&known.scene, [SIZE; 2], FINE)?.picture;
+        let limit: Vec<[f64; 4]> = limit.pixels.iter().map(|p| p.map(f64::from)).collect();
+        let mut line = Line::new(&*painter, &known, "spacing");
+        for spacing in COARSE {
+            let picture = painter.paint(&known.scene, [SIZE; 2], spacing)?.picture;
+            line.report(bench, spacing, apart(&picture, &truth), Some(apart(&picture, &limit)))?;
+        }
+    }
+    let mut line = Line::new(&*painter, &known::ball(COUNTS[0])?.with_texture(format), "grid");
+    for count in COUNTS {
+        let known = known::ball(count)?.with_texture(format);
+        let picture = painter.paint(&known.scene, [SIZE; 2], FINE)?.picture;
+        line.report(bench, 1.0 / count as f64, apart(&picture, &truth(&known)), None)?;
+    }
+    Ok(())
+}
+
+/// Whether what a texture holds differs from the samples by more than the rounding of `f32`.
+fn is_lossy(format: TextureFormat) -> bool {
+    !matches!(format, TextureFormat::Auto | TextureFormat::R32f)
+}
+
+/// One thing that is refined, with what was measured so far: width and error.
+struct Line {
+    renderer: &'static str,
+    scene: &'static str,
+    texture: Option<&'static str>,
+    refined: &'static str,
+    errors: Vec<(f64, f64)>,
+}
+
+impl Line {
+    fn new(painter: &dyn Painter, known: &Known, refined: &'static str) -> Self {
+        let format = known.format();
+        let texture = is_lossy(format).then(|| format.name());
+        Self { renderer: painter.name(), scene: known.name, texture, refined, errors: Vec::new() }
+    }
+
+    /// A row: the error, its order since the last one and since some before, and the error of the steps alone.
+    fn report(
+        &mut self,
+        bench: &mut Bench,
+        width: f64,
+        [rms, max]: [f64; 2],
+        steps: Option<[f64; 2]>,
+    ) -> Result<(), Failure> {
+        self.errors.push((width, rms));
+        let since = |back: usize| {
+            let before = self.errors.len().checked_sub(back + 1)?;
+            order(self.errors[before], (width, rms))
+        };
+        let name = self.texture.map_or_else(String::new, |texture| format!(" {texture}"));
+        bench.report(json!({
+            "bench": "accuracy", "renderer": self.renderer, "texture": self.texture, "refined": self.refined,
+            "scene": self.scene, "width": width, "rms_error_255": rms, "max_error_255": max,
+            "order": since(1), "order_of_four": since(HALVINGS),
+            "steps_rms_255": steps.map(|[rms, _]| rms), "steps_max_255": steps.map(|[_, max]| max),
+            "line": format!("{}{name}, {}", self.renderer, self.scene),
+        }))
+    }
 }
 
 /// The power of the width that the error fell by; none where either is of rounding's size.
@@ -159,15 +223,23 @@ fn apart(picture: &FloatImage, truth: &[[f64; 4]]) -> [f64; 2] {
     [(square / (4 * truth.len()) as f64).sqrt(), max]
 }
 
-/// A chart for each refinement.
+/// A chart for each refinement, and one more where there are textures with a loss.
 pub(super) fn charts(rows: &[Row]) -> Vec<(&'static str, Chart)> {
+    let [spacing, voxel] = ["slice spacing, voxels", "voxel, parts of the side"];
     let kinds = [
-        ("accuracy_spacing.svg", "spacing", "slice spacing, voxels"),
-        ("accuracy_grid.svg", "grid", "voxel, parts of the side"),
-        ("accuracy_pixels.svg", "pixels", "pixel, parts of the side"),
+        ("accuracy_spacing.svg", "spacing", spacing, false),
+        ("accuracy_grid.svg", "grid", voxel, false),
+        ("accuracy_pixels.svg", "pixels", "pixel, parts of the side", false),
+        ("accuracy_spacing_textures.svg", "spacing", spacing, true),
+        ("accuracy_grid_textures.svg", "grid", voxel, true),
     ];
-    let chart = |(file, refined, x): (&'static str, &str, &str)| {
-        let rows: Vec<Row> = rows.iter().filter(|r| r["refined"] == refined).cloned().collect();
+    // Of the scenes with textures those whose integrand is smooth.
+    let shown = |row: &Row, refined: &str, lossy: bool| {
+        let fits = !lossy || row["scene"] == "product" || row["scene"] == "ball";
+        row["refined"] == refined && row["texture"].is_null() != lossy && fits
+    };
+    let chart = |(file, refined, x, lossy): (&'static str, &str, &str, bool)| {
+        let rows: Vec<Row> = rows.iter().filter(|r| shown(r, refined, lossy)).cloned().collect();
         let point = |row: &Row| (number(row, "width"), number(row, "rms_error_255"), String::new());
         let series: Vec<Series> = super::series(&rows, "line", &point);
         let title = "Error against the known picture".to_owned();
