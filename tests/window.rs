@@ -12,7 +12,8 @@ use crate::support::{cases, gpu_wanted};
 /// Software rendering of every view, on a busy machine, with shaders compiled for the first time.
 const LIMIT: Duration = Duration::from_mins(5);
 
-fn screenshot_of(arguments: &[&str], folder: &Path) -> image::RgbImage {
+/// The window's picture, and what it said on standard error.
+fn screenshot_of(arguments: &[&str], folder: &Path, variables: &[(&str, &str)]) -> (image::RgbImage, String) {
     let display = Display::start();
     let picture = folder.join("window.png");
     let log = folder.join("window.log");
@@ -24,6 +25,7 @@ fn screenshot_of(arguments: &[&str], folder: &Path) -> image::RgbImage {
         .env("XDG_DATA_HOME", folder.join("data"))
         .env("OSTEOTOME_SCREENSHOT", &picture)
         .env_remove("WAYLAND_DISPLAY")
+        .envs(variables.iter().copied())
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(std::fs::File::create(&log).unwrap())
@@ -33,7 +35,12 @@ fn screenshot_of(arguments: &[&str], folder: &Path) -> image::RgbImage {
     let said = std::fs::read_to_string(&log).unwrap_or_default();
     let status = status.unwrap_or_else(|| panic!("the window neither drew nor closed in {LIMIT:?}: {said}"));
     assert!(status.success(), "the window closes cleanly after its screenshot: {status}: {said}");
-    open_rgb(&picture)
+    (open_rgb(&picture), said)
+}
+
+/// The ball is orange and nothing of the program's own look is: if it is drawn, some pixels are clearly so.
+fn orange(picture: &image::RgbImage) -> usize {
+    picture.pixels().filter(|p| p.0[0] > 120 && p.0[0] > p.0[2].saturating_add(60)).count()
 }
 
 #[test]
@@ -43,14 +50,25 @@ fn the_window_starts_on_a_case_draws_it_and_closes() {
     }
     let folder = tempfile::tempdir().unwrap();
     let case = cases::write_case(folder.path(), &cases::cut_ball(folder.path()));
-    let picture = screenshot_of(&[case.to_str().unwrap()], folder.path());
+    let (picture, _) = screenshot_of(&[case.to_str().unwrap()], folder.path(), &[]);
     assert!(
         picture.width() >= 800 && picture.height() >= 500,
         "a window of a useful size: {:?}",
         picture.dimensions()
     );
     assert!(colours(&picture) > 1000, "views and panels, not an empty window: {} colours", colours(&picture));
-    // The ball is orange and nothing of the program's own look is: if it is drawn, some pixels are clearly so.
-    let orange = picture.pixels().filter(|p| p.0[0] > 120 && p.0[0] > p.0[2].saturating_add(60)).count();
-    assert!(orange > 2000, "the volume's own colour is on screen: {orange} pixels");
+    assert!(orange(&picture) > 2000, "the volume's own colour is on screen: {} pixels", orange(&picture));
+}
+
+#[test]
+fn a_window_whose_device_is_lost_opens_again_and_draws_the_same_case() {
+    if !gpu_wanted() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let case = cases::write_case(folder.path(), &cases::cut_ball(folder.path()));
+    let lost = [("OSTEOTOME_LOSE_GPU", "5")];
+    let (picture, said) = screenshot_of(&[case.to_str().unwrap()], folder.path(), &lost);
+    assert!(said.contains("stopped answering") && !said.contains("panicked"), "{said}");
+    assert!(orange(&picture) > 2000, "the case is drawn again: {} pixels", orange(&picture));
 }

@@ -6,6 +6,7 @@ use render::scene::Piece;
 use render::section::{self, Layer, Section, Window};
 use render::volume::{Grid, Point};
 
+use crate::case::assets::Key;
 use crate::case::{Assets, Case, Volume};
 use crate::scene;
 
@@ -68,6 +69,13 @@ pub fn cutter_lines(case: &Case, layers: &[Layer], section: &Section, reach_mm: 
         layer.pieces.iter().flat_map(of_piece).map(|line| line.places)
     });
     whole.chain(bounds).collect()
+}
+
+/// The unit of a volume's values, to stand after a number: `" HU"` of CT, else nothing.
+pub fn unit(assets: &Assets, volume: &Volume, grid: &Grid) -> &'static str {
+    let modality = assets.asset(&Key::of_volume(volume)).and_then(|a| a.modality.as_deref());
+    let is_ct = modality.map_or(grid.range()[0] < AIR_BELOW, |m| m == "CT");
+    if is_ct { " HU" } else { "" }
 }
 
 /// The window a volume gets before anybody has chosen.

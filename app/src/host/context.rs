@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 // A tool sees of the renderer only data in space; these few plain types come through here.
-pub use render::scene::{Shading, TextureFormat};
+pub use render::scene::{Shading, TextureFormat, VolumeMode};
 pub use render::section::{Slab, SlabMode, Window};
 use render::volume::Point;
 

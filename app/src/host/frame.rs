@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use egui::layers::GraphicLayers;
 use egui::{
     Button, CentralPanel, Frame, Key, KeyboardShortcut, Modifiers, Panel, Rect, RichText, ScrollArea, Ui,
 };
 use render::gpu::GpuError;
-use render::renderer::{Quality, Stats};
 use render::scene::Scene;
 use render::section::Layer;
 
@@ -15,18 +15,18 @@ use super::camera::Ball;
 use super::context::{Request, Selection, ToolContext};
 use super::dialogs::{Dialog, Question};
 use super::overlay::Overlay;
-use super::pacer::{Need, Pacer};
+use super::picture::{Picture, PictureKey};
 use super::pointer::{PointerEvent, SectionEvent};
 use super::registry::Registry;
 use super::screenshot::{Screenshot, ScreenshotError};
 use super::section_view::{SectionInput, SectionView};
 use super::session::{Session, Wake};
 use super::spatial_view::{SpatialAnswer, SpatialInput, SpatialView};
-use super::status::{Status, status_ui};
+use super::status::status_ui;
 use super::tool::ToolId;
 use super::viewport::Viewport;
 use super::views::{Orientation, ViewId, Views};
-use super::{help, layout, pick};
+use super::{help, layout, loss, pick};
 use crate::case::{Case, Edit, assets};
 use crate::ui::theme;
 use crate::{scene, sections};
@@ -36,15 +36,6 @@ const REDO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND.plus(Mod
 const OPEN: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::O);
 const SAVE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::S);
 const SAVE_AS: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::S);
-
-/// All that a 3D picture depends on.
-#[derive(Debug, Clone, PartialEq)]
-struct PictureKey {
-    case: Case,
-    revision: u64,
-    camera: render::scene::Camera,
-    size: [u32; 2],
-}
 
 /// What the user is asked before changes are lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,16 +58,14 @@ pub struct Host {
     views: Views,
     spatial: SpatialView,
     sections: [SectionView; 3],
-    pacer: Pacer<PictureKey>,
-    viewport: Option<Viewport>,
-    stats: Option<Stats>,
-    picture_size: [u32; 2],
-    picture_scale: f64,
-    picture_fault: String,
+    picture: Picture,
     dialog: Option<Dialog>,
     help_open: bool,
     leaving: Leaving,
     replaced: u64,
+    lost: bool,
+    /// Frames until the device is given up.
+    lose_before: Option<u64>,
     screenshot: Option<Screenshot>,
     screenshot_fault: Arc<Mutex<Option<ScreenshotError>>>,
     wake: Wake,
@@ -113,16 +102,13 @@ impl Host {
             views: Views::new(),
             spatial: SpatialView::default(),
             sections: Default::default(),
-            pacer: Pacer::default(),
-            viewport: None,
-            stats: None,
-            picture_size: [0, 0],
-            picture_scale: 1.0,
-            picture_fault: "no graphics device".to_owned(),
+            picture: Picture::default(),
             dialog: None,
             help_open: false,
             leaving: Leaving::No,
             replaced: 0,
+            lost: false,
+            lose_before: None,
             screenshot: None,
             screenshot_fault: Arc::default(),
             wake,
@@ -134,18 +120,18 @@ impl Host {
         self.session.open(paths);
     }
 
-    /// Gives it the device, or why there is none.
+    /// Gives it the device of a window that opens, or why there is none.
     pub fn attach(&mut self, viewport: Result<Viewport, GpuError>) {
-        match viewport {
-            Ok(viewport) => {
-                self.viewport = Some(viewport);
-                self.picture_fault.clear();
-            }
-            Err(error) => {
-                self.picture_fault = error.to_string();
-                self.session.complain(error.to_string());
-            }
+        if self.lost {
+            self.lost = false;
+            self.session.complain(
+                "The graphics device stopped answering. The window was opened again; nothing is lost.",
+            );
         }
+        if let Err(error) = &viewport {
+            self.session.complain(error.to_string());
+        }
+        self.picture = Picture::new(viewport);
     }
 
     /// Takes a screenshot once everything is at rest, and closes; a failure goes to `fault`.
@@ -154,9 +140,24 @@ impl Host {
         self.screenshot_fault = fault;
     }
 
+    /// Gives the device up before that frame, counted from 1.
+    pub fn lose_before(&mut self, frame: Option<u64>) {
+        self.lose_before = frame;
+    }
+
+    /// Whether the window closed because its device is lost.
+    pub fn is_lost(&self) -> bool {
+        self.lost
+    }
+
     /// The open case.
     pub fn session(&self) -> &Session {
         &self.session
+    }
+
+    /// The open case, to be saved.
+    pub fn session_mut(&mut self) -> &mut Session {
+        &mut self.session
     }
 
     /// What the views show.
@@ -173,6 +174,13 @@ impl Host {
     /// One frame.
     pub fn frame_ui(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
+        if let Some(viewport) = self.picture.viewport().filter(|_| self.lose_before == Some(1)) {
+            viewport.lose();
+        }
+        self.lose_before = self.lose_before.and_then(|frames| frames.checked_sub(1));
+        if self.closes_if_lost(&ctx) {
+            return;
+        }
         let now_secs = ctx.input(|i| i.time);
         let mut wishes = Wishes::default();
         self.session.tick(now_secs);
@@ -205,6 +213,27 @@ impl Host {
             ctx.request_repaint_after_secs(0.1);
         }
         self.take_screenshot(&ctx);
+        self.closes_if_lost(&ctx);
+    }
+
+    /// Closes the window where its device is lost, and shows nothing: what paints the window takes a lost device that
+    /// it is to paint on for a fault of the program.
+    fn closes_if_lost(&mut self, ctx: &egui::Context) -> bool {
+        if self.picture.viewport().is_some_and(Viewport::is_lost) {
+            log::error!("the graphics device stopped answering; the window is opened again");
+            self.lost = true;
+            // What was on the device went with it.
+            self.picture = Picture::default();
+            self.sections = Default::default();
+            if let Some(screenshot) = &mut self.screenshot {
+                screenshot.restart();
+            }
+        }
+        if self.lost {
+            ctx.graphics_mut(|shapes| *shapes = GraphicLayers::default());
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+        self.lost
     }
 
     fn dropped(&mut self, ctx: &egui::Context) {
@@ -266,14 +295,7 @@ impl Host {
 
     fn status_ui(&mut self, ui: &mut Ui) {
         let loading = self.session.progress();
-        let adapter = self.viewport.as_ref().map_or(self.picture_fault.as_str(), Viewport::adapter);
-        let status = Status {
-            adapter,
-            stats: self.stats.as_ref(),
-            size: self.picture_size,
-            is_reduced: self.pacer.is_at_rest() && self.picture_scale < 1.0,
-            loading,
-        };
+        let status = self.picture.status(loading);
         if status_ui(ui, &status) {
             self.session.cancel();
         }
@@ -324,7 +346,7 @@ impl Host {
         ui: &mut Ui,
         (rect, orientation): (Rect, Orientation),
         ball: Ball,
-        (layers, names): (&[Layer], &[(String, &'static str)]),
+        (layers, names): (&[Layer], &[(String, String)]),
         wishes: &mut Wishes,
     ) {
         let windowed = self.selection.volume.clone();
@@ -369,8 +391,8 @@ impl Host {
             tool.draw(&context, &mut overlay);
         }
         let is_empty = scene.volumes.is_empty() && scene.meshes.is_empty();
-        let instead = if !self.picture_fault.is_empty() {
-            self.picture_fault.as_str()
+        let instead = if !self.picture.fault().is_empty() {
+            self.picture.fault()
         } else if is_empty && self.session.is_idle() {
             "Drop files here, or press Open…"
         } else if is_empty {
@@ -381,7 +403,7 @@ impl Host {
         let input = SpatialInput {
             camera: scene.camera,
             ball,
-            texture: self.viewport.as_ref().and_then(Viewport::texture).filter(|_| !is_empty),
+            texture: self.picture.texture().filter(|_| !is_empty),
             instead,
             background: scene.background,
             overlay: &overlay,
@@ -410,55 +432,17 @@ impl Host {
         }
     }
 
-    /// Draws the 3D picture if anything changed, roughly at first.
+    /// Draws the 3D picture if anything changed.
     fn draw_picture(&mut self, ui: &Ui, rect: Rect, scene: &Scene) {
-        let Some(viewport) = &mut self.viewport else { return };
-        if scene.volumes.is_empty() && scene.meshes.is_empty() {
-            return;
-        }
-        let now_secs = ui.input(|i| i.time);
         let density = ui.ctx().pixels_per_point();
-        let size = [rect.width(), rect.height()].map(|s| ((s * density).round() as u32).max(1));
         let key = PictureKey {
             case: self.session.case().clone(),
             revision: self.session.revision(),
             camera: scene.camera,
-            size,
+            size: [rect.width(), rect.height()].map(|s| ((s * density).round() as u32).max(1)),
         };
-        let need = self.pacer.need(&key, now_secs);
-        let (quality, scale) = match need {
-            Need::Nothing => return,
-            Need::Later(secs) => {
-                ui.ctx().request_repaint_after_secs(secs as f32);
-                return;
-            }
-            Need::Draft { scale } => (Quality::Draft, scale),
-            // Nobody waits for a window that takes its own picture.
-            Need::Good { scale } => (Quality::Good, if self.screenshot.is_some() { 1.0 } else { scale }),
-        };
-        let size = size.map(|s| ((f64::from(s) * scale) as u32).max(1));
-        let drawn = viewport.draw(scene, size, quality);
-        match (&drawn, need) {
-            (Ok(stats), Need::Draft { scale }) => {
-                self.pacer.drew_draft(key, scale, stats.frame_ms - stats.prepare_ms);
-                ui.ctx().request_repaint_after_secs(super::pacer::REST_SECS as f32);
-            }
-            (Ok(_), _) => self.pacer.drew_good(),
-            (Err(_), _) => {
-                // The same picture would fail again: wait for another.
-                self.pacer.drew_draft(key, 1.0, 0.0);
-                self.pacer.drew_good();
-            }
-        }
-        match drawn {
-            Ok(stats) => {
-                self.stats = Some(stats);
-                self.picture_size = size;
-                self.picture_scale = scale;
-                self.picture_fault.clear();
-            }
-            Err(error) => self.picture_fault = error.to_string(),
-        }
+        // Nobody waits for a window that takes its own picture.
+        self.picture.draw(ui.ctx(), scene, key, self.screenshot.is_some());
     }
 
     /// Does what the frame asked for.
@@ -595,9 +579,8 @@ impl Host {
     }
 
     fn take_screenshot(&mut self, ctx: &egui::Context) {
-        let draws = self.viewport.is_some() && self.picture_fault.is_empty();
         let shows = !self.session.case().volumes.is_empty() || !self.session.case().implants.is_empty();
-        let at_rest = self.session.is_idle() && (!draws || !shows || self.pacer.is_at_rest());
+        let at_rest = self.session.is_idle() && self.picture.is_at_rest(shows);
         let Some(done) = self.screenshot.as_mut().and_then(|s| s.step(ctx, at_rest)) else { return };
         if let Err(error) = done {
             *self.screenshot_fault.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
@@ -608,9 +591,12 @@ impl Host {
     }
 }
 
-impl eframe::App for Host {
-    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
-        self.frame_ui(ui);
+impl Drop for Host {
+    /// A fault in what draws the window must not take the plan along.
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            log::error!("the window ended because of a fault: {}", loss::rescue(&mut self.session));
+        }
     }
 }
 
@@ -632,20 +618,13 @@ fn keys(ctx: &egui::Context, wishes: &mut Wishes) {
 }
 
 /// Names and units of the volumes that [`Views::layers`] shows, in the same order.
-fn names(case: &Case, loaded: &assets::Assets) -> Vec<(String, &'static str)> {
+fn names(case: &Case, loaded: &assets::Assets) -> Vec<(String, String)> {
     let shown = case.volumes.iter().filter(|v| v.visible);
     let named = shown.filter_map(|volume| {
         let grid = loaded.grid(volume)?;
-        let modality = loaded.asset(&assets::Key::of_volume(volume)).and_then(|a| a.modality.clone());
-        let is_ct = modality.map_or(grid.range()[0] < sections::AIR_BELOW, |m| m == "CT");
         let is_lossy = loaded.steps(volume).is_some_and(|steps| steps.is_lossy());
-        let unit = match (is_ct, is_lossy) {
-            (true, false) => " HU",
-            (true, true) => " HU (lossy)",
-            (false, true) => " (lossy)",
-            (false, false) => "",
-        };
-        Some((volume.id.clone(), unit))
+        let lossy = if is_lossy { " (lossy)" } else { "" };
+        Some((volume.id.clone(), format!("{}{lossy}", sections::unit(loaded, volume, &grid))))
     });
     named.collect()
 }

@@ -42,6 +42,11 @@ impl Screenshot {
         Some(Self { path: PathBuf::from(path), rested: 0, asked: false, taken: Arc::default() })
     }
 
+    /// Begins anew, in a window that takes the place of the one asked before.
+    pub fn restart(&mut self) {
+        (self.rested, self.asked) = (0, false);
+    }
+
     /// To be called every frame; `at_rest` where nothing is loaded or drawn any more. Gives the result
     /// once the file is written, or is not.
     pub fn step(&mut self, ctx: &egui::Context, at_rest: bool) -> Option<Result<(), ScreenshotError>> {

@@ -99,7 +99,7 @@ pub struct SectionInput<'a> {
     /// The visible volumes.
     pub layers: &'a [Layer],
     /// Names and units of the layers' volumes.
-    pub names: &'a [(String, &'static str)],
+    pub names: &'a [(String, String)],
     /// The volume whose window a right drag changes.
     pub windowed: Option<&'a str>,
     /// The ball about everything.

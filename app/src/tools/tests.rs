@@ -13,7 +13,7 @@ use super::register_all;
 use crate::case::assets::{Asset, Data, Key};
 use crate::case::labels::LabelChange;
 use crate::case::{Assets, Case, Edit, Fragment, Implant, LabelSet, NamedCutter, Source, Volume, edit};
-use crate::host::context::{Request, Selection, ToolContext};
+use crate::host::context::{Request, Selection, ToolContext, VolumeMode};
 use crate::host::overlay::Overlay;
 use crate::host::pointer::{Phase, SectionEvent};
 use crate::host::registry::Registry;
@@ -144,6 +144,40 @@ fn hiding_a_volume_is_one_edit() {
     panel.run();
     let wanted = Edit::SetVolumeVisible { id: "ct".to_owned(), visible: false };
     assert_eq!(panel.state().edits, [wanted], "that and nothing else");
+}
+
+#[test]
+fn the_mode_in_3d_is_chosen_and_an_isosurface_has_a_value_and_an_opacity() {
+    let mode = |mode| Edit::SetVolumeMode { id: "ct".to_owned(), mode };
+    for (words, chosen) in [
+        ("Greatest value (MIP)", VolumeMode::Mip),
+        // Half of the greatest opacity is reached half way from 100 to 400.
+        ("Isosurface", VolumeMode::Isosurface { value: 250.0, opacity: 1.0 }),
+    ] {
+        let mut panel = panel(bench(), ToolId("volumes"));
+        panel.run();
+        panel.get_by_label("Drawn as").click();
+        panel.run();
+        panel.get_by_label(words).click();
+        panel.run();
+        // The bench applies nothing, so that a choice that stays open is asked for once.
+        assert_eq!(panel.state().edits, [mode(chosen)], "{words}");
+    }
+    let mut bench = bench();
+    bench.case.volumes[0].mode = VolumeMode::Isosurface { value: 9000.0, opacity: 0.5 };
+    let mut panel = panel(bench, ToolId("volumes"));
+    panel.run();
+    assert!(panel.state().edits.is_empty(), "a value out of range is left alone: {:?}", panel.state().edits);
+    let opacity = panel.get_all_by_label("Opacity of the surface").next().expect("a slider");
+    opacity.focus();
+    panel.key_press(egui::Key::ArrowRight);
+    panel.run();
+    let [Edit::SetVolumeMode { mode: VolumeMode::Isosurface { value, opacity }, .. }] =
+        panel.state().edits.as_slice()
+    else {
+        panic!("one change, not {:?}", panel.state().edits)
+    };
+    assert!(*value == 9000.0 && *opacity > 0.5, "the opacity alone: {value}, {opacity}");
 }
 
 #[test]

@@ -3,7 +3,8 @@
 mod error;
 mod readback;
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::panic::AssertUnwindSafe;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 pub use error::GpuError;
@@ -60,6 +61,7 @@ pub struct Gpu {
     lost_after: AtomicU32,
     /// The last fault that no call returned: set by the device's callbacks.
     fault: Arc<Mutex<Option<GpuError>>>,
+    lost: Arc<AtomicBool>,
 }
 
 impl Gpu {
@@ -113,14 +115,16 @@ impl Gpu {
             // The first fault is the cause; those after it are its echo.
             seen.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
         }));
-        let seen = Arc::clone(&fault);
+        let lost = Arc::new(AtomicBool::new(false));
+        let (seen, is_lost) = (Arc::clone(&fault), Arc::clone(&lost));
         device.set_device_lost_callback(move |_, reason| {
+            is_lost.store(true, Ordering::Relaxed);
             let lost = GpuError::Lost { reason };
             // Whatever else was reported is an echo of this.
             *seen.lock().unwrap_or_else(PoisonError::into_inner) = Some(lost);
         });
         let adapter = format!("{} ({:?})", info.name, info.backend);
-        Self { device, queue, adapter, caps, lost_after: AtomicU32::new(0), fault }
+        Self { device, queue, adapter, caps, lost_after: AtomicU32::new(0), fault, lost }
     }
 
     /// Name and interface of the adapter: `"llvmpipe (LLVM 15.0.6, 256 bits) (Vulkan)"`.
@@ -138,6 +142,11 @@ impl Gpu {
     /// it was carried out.
     pub fn lose_after(&self, call: u32) -> u32 {
         self.lost_after.swap(call, Ordering::Relaxed)
+    }
+
+    /// Whether the device is lost, which it is asked first. It stays so.
+    pub fn is_lost(&self) -> bool {
+        self.poll(wgpu::PollType::Poll).is_err() || self.lost.load(Ordering::Relaxed)
     }
 
     /// A call is about to be made that a lost device answers with a fault.
@@ -165,9 +174,21 @@ impl Gpu {
         let take = || self.fault.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some(fault) = take() else { return Ok(()) };
         // What a lost device is asked for is refused before the loss is told: ask whether there is one to tell.
-        match self.device.poll(wgpu::PollType::Poll) {
-            Ok(_) => Err(take().filter(|later| matches!(later, GpuError::Lost { .. })).unwrap_or(fault)),
-            Err(error) => Err(GpuError::Lost { reason: error.to_string() }),
+        self.poll(wgpu::PollType::Poll)?;
+        Err(take().filter(|later| matches!(later, GpuError::Lost { .. })).unwrap_or(fault))
+    }
+
+    /// Lets the device tell what is done; [`GpuError::Lost`] where it does not answer.
+    fn poll(&self, how: wgpu::PollType) -> Result<(), GpuError> {
+        #[expect(clippy::disallowed_methods, reason = "wgpu 30 panics where a wait finds the device lost")]
+        let polled = std::panic::catch_unwind(AssertUnwindSafe(|| self.device.poll(how)));
+        match polled {
+            Ok(Ok(_)) => Ok(()),
+            Ok(Err(error)) => Err(GpuError::Lost { reason: error.to_string() }),
+            Err(_) => {
+                self.lost.store(true, Ordering::Relaxed);
+                Err(GpuError::Lost { reason: "it was lost while it was waited for".to_owned() })
+            }
         }
     }
 
@@ -176,9 +197,8 @@ impl Gpu {
     /// # Errors
     /// [`GpuError::Lost`], or what the device reported meanwhile.
     pub(crate) fn wait(&self) -> Result<(), GpuError> {
-        let done = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: None });
+        let done = self.poll(wgpu::PollType::Wait { submission_index: None, timeout: None });
         self.check()?;
-        done.map_err(|e| GpuError::Lost { reason: e.to_string() })?;
-        Ok(())
+        done
     }
 }

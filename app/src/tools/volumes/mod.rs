@@ -1,5 +1,6 @@
-//! Volumes: open, show and hide, window, texture format, place.
+//! Volumes: open, show and hide, window, weight, mode in 3D, texture format, place.
 
+mod mode;
 mod panel;
 pub mod window;
 

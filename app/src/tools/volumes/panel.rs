@@ -2,11 +2,12 @@
 
 use egui::{Button, ComboBox, RichText, Slider, Ui};
 
-use super::window;
+use super::{mode, window};
 use crate::case::{Edit, Volume, assets};
 use crate::host::context::{Request, TextureFormat, ToolContext, Window};
 use crate::host::views;
 use crate::load::Severity;
+use crate::sections;
 use crate::ui::pose::{PoseEditor, PoseInput};
 use crate::ui::{name, theme, value};
 
@@ -91,6 +92,7 @@ fn chosen_ui(pose: &mut PoseEditor, ctx: &mut ToolContext<'_>, ui: &mut Ui, volu
         if ui.add(Slider::new(&mut blend, 0.0..=1.0).text("Weight in the sections")).changed() {
             ctx.edit(Edit::SetBlend { id: volume.id.clone(), blend });
         }
+        mode::mode_ui(ctx, ui, volume, &grid, sections::unit(ctx.assets, volume, &grid));
         texture_ui(ctx, ui, volume);
         let centre = views::ball_of(volume, &grid).centre;
         ui.collapsing("Place in the world", |ui| {
