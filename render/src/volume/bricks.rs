@@ -66,7 +66,9 @@ impl Bricks {
         let mut edge = Self::EDGE;
         let bricks = boxes.len();
         while boxes.len() > most_boxes.max(1) {
-            boxes.iter_mut().for_each(|place| *place = place.map(|i| i / 2));
+            for place in &mut boxes {
+                *place = place.map(|i| i / 2);
+            }
             boxes.sort_unstable();
             boxes.dedup();
             edge *= 2;

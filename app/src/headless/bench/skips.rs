@@ -26,7 +26,7 @@ const TURNS: usize = 7;
 pub(super) fn run(input: &Input, bench: &mut Bench) -> Result<(), Failure> {
     let scene = scene::scene(&input.case, &input.assets);
     let gpu = Arc::new(Gpu::headless()?);
-    let new: [(&str, &dyn Fn() -> Result<Drawer, Failure>); 2] = [
+    let new: [(&str, &Maker<'_>); 2] = [
         ("cpu", &|| Ok(Drawer::Cpu(CpuRenderer::new()))),
         ("gpu", &|| Ok(Drawer::Gpu(Box::new(Renderer::new(Arc::clone(&gpu))?)))),
     ];
@@ -39,6 +39,9 @@ pub(super) fn run(input: &Input, bench: &mut Bench) -> Result<(), Failure> {
     }
     Ok(())
 }
+
+/// Makes a renderer that has drawn nothing yet.
+type Maker<'a> = dyn Fn() -> Result<Drawer, Failure> + 'a;
 
 /// Either renderer.
 enum Drawer {
@@ -79,12 +82,7 @@ fn least<const N: usize>(mut turn: impl FnMut(usize) -> Result<f64, Failure>) ->
     Ok(least)
 }
 
-fn on_and_off(
-    scene: &Scene,
-    name: &str,
-    new: &dyn Fn() -> Result<Drawer, Failure>,
-    bench: &mut Bench,
-) -> Result<(), Failure> {
+fn on_and_off(scene: &Scene, name: &str, new: &Maker<'_>, bench: &mut Bench) -> Result<(), Failure> {
     let settings = [
         Skips::default(),
         Skips { empty: false, ..Skips::default() },

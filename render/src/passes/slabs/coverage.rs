@@ -50,15 +50,10 @@ impl Tiles {
             let most = f64::from(self.count[a] - 1);
             (last >= 0.0 && first <= most).then(|| [first, last].map(|tile| tile.clamp(0.0, most) as u32))
         };
-        let [width, height] = self.size.map(f64::from);
-        let x = axis(0, (low[0] + 1.0) / 2.0 * width, (high[0] + 1.0) / 2.0 * width)?;
-        let y = axis(1, (1.0 - high[1]) / 2.0 * height, (1.0 - low[1]) / 2.0 * height)?;
+        let [width, height] = self.size.map(|n| 0.5 * f64::from(n));
+        let x = axis(0, (1.0 + low[0]) * width, (1.0 + high[0]) * width)?;
+        let y = axis(1, (1.0 - high[1]) * height, (1.0 - low[1]) * height)?;
         Some([x, y])
-    }
-
-    /// Column and row of each tile within bounds, row by row.
-    pub(crate) fn each(self, [x, y]: [[u32; 2]; 2]) -> impl Iterator<Item = [u32; 2]> {
-        (y[0]..=y[1]).flat_map(move |row| (x[0]..=x[1]).map(move |column| [column, row]))
     }
 
     fn index(self, [column, row]: [u32; 2]) -> usize {
@@ -74,6 +69,11 @@ impl Tiles {
             [1.0 - 2.0 * end(1, row + 1), 1.0 - 2.0 * end(1, row)],
         ]
     }
+}
+
+/// Column and row of each tile within bounds, row by row.
+pub(crate) fn each([x, y]: [[u32; 2]; 2]) -> impl Iterator<Item = [u32; 2]> {
+    (y[0]..=y[1]).flat_map(move |row| (x[0]..=x[1]).map(move |column| [column, row]))
 }
 
 /// What of a fragment may show.
@@ -132,7 +132,7 @@ impl Coverage {
         let Some([x, y]) = self.tiles.between(low, high) else { return };
         let words = self.tiles.words();
         for slab in first.max(0.0) as usize..=(last as usize).min(spacing.slabs as usize - 1) {
-            for tile in self.tiles.each([x, y]) {
+            for tile in each([x, y]) {
                 let bit = self.tiles.index(tile);
                 let word = &self.slabs[slab * words + bit / 64];
                 let mask = 1 << (bit % 64);
@@ -249,14 +249,14 @@ mod tests {
                     }
                     let tile =
                         |a: usize, part: f64| (part * f64::from(size[a]) / f64::from(tiles.edge)) as u32;
-                    let (x, y) = (tile(0, (ndc[0] + 1.0) / 2.0), tile(1, (1.0 - ndc[1]) / 2.0));
+                    let (x, y) = (tile(0, 1.0 + ndc[0]), tile(1, 1.0 - ndc[1]));
                     assert!(coverage.has(slab as u32, [x, y]), "{at:?} in slab {slab}");
                     seen += 1;
                 }
             }
             assert!(seen > 1000, "only {seen} points lay in the picture");
             let all = [[0, tiles.count[0] - 1], [0, tiles.count[1] - 1]];
-            let marked = |slab| tiles.each(all).filter(|tile| coverage.has(slab, *tile)).count() as u64;
+            let marked = |slab| each(all).filter(|tile| coverage.has(slab, *tile)).count() as u64;
             let total: u64 = (0..spacing.slabs).map(marked).sum();
             let most = u64::from(spacing.slabs * tiles.count[0] * tiles.count[1]);
             assert!(total < most / 4, "{total} of {most} tiles");

@@ -1,7 +1,7 @@
 //! The common stack of slabs: which members each tile of each slab holds, and the vertices and draws that follow, front to
 //! back. What a tile holds is integrated together; tiles share no pixel, so nothing is drawn twice.
 
-use super::coverage::{Coverage, Rectangle, Sets, Shown, Tiles};
+use super::coverage::{Coverage, Rectangle, Sets, Shown, Tiles, each};
 use super::polygons::{Proxy, bounds, clipped};
 use super::{Kind, SATURATE_EVERY, SLOTS};
 use crate::view::View;
@@ -139,7 +139,7 @@ impl Stack {
                 }
                 let [low, high] = bounds(&polygon);
                 let Some(within) = tiles.between(low, high) else { continue };
-                for tile in tiles.each(within) {
+                for tile in each(within) {
                     let shows = match coverage {
                         Some(coverage) => coverage.has(slab, tile),
                         None => !clipped(polygon.clone(), tiles.rectangle([tile[0]; 2], tile[1])).is_empty(),

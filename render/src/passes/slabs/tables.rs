@@ -50,7 +50,9 @@ impl TableCache {
         if self.kept.iter().any(|k| !k.used) {
             *self = Self::default();
         }
-        self.kept.iter_mut().for_each(|k| k.used = false);
+        for kept in &mut self.kept {
+            kept.used = false;
+        }
     }
 
     /// The table of a function over the values between `range[0]` and `range[1]`.
