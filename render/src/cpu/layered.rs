@@ -4,9 +4,10 @@
 use super::cubic::Cubic;
 use super::painting::paint;
 use super::piece::{Placed, Stretches};
+use super::shine::shine;
 use super::surfaces::Hit;
 use super::walker::{Ray, Walker};
-use crate::scene::{VolumeMode, light};
+use crate::scene::VolumeMode;
 use crate::volume::Transfer;
 
 /// A volume in one of these modes, with its pieces before the camera.
@@ -103,8 +104,7 @@ impl Layered<'_> {
         let mut found = |walker: &Walker<'_>, zeta: f32| {
             let mut color = painted(walker.piece(), lens, zeta, [r, g, b]);
             if let Some(facing) = walker.facing(zeta, ray) {
-                let highlight = light::SPECULAR as f32 * facing.powf(light::SHININESS as f32);
-                let shade = light::AMBIENT as f32 + light::DIFFUSE as f32 * facing;
+                let [shade, highlight] = shine(facing);
                 color = color.map(|c| (c * shade + highlight).clamp(0.0, 1.0));
             }
             into.push(Hit::layer(zeta, color, opacity as f32));

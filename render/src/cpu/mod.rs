@@ -27,6 +27,7 @@ mod march;
 mod packet;
 mod painting;
 mod piece;
+mod shine;
 mod surfaces;
 mod table;
 mod tiles;

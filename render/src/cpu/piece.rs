@@ -3,8 +3,9 @@
 use super::field::{Field, Occupancy};
 use super::line::{Form, Rays};
 use super::painting::Painting;
+use super::shine::shine;
 use super::table::Table;
-use crate::scene::{Piece, Shading, VolumeItem, light};
+use crate::scene::{Piece, Shading, VolumeItem};
 use crate::view::View;
 use crate::volume::convex::HalfSpace;
 use crate::volume::{Affine, Body, Face, Point, Vector};
@@ -170,8 +171,7 @@ impl<'a> Placed<'a> {
     /// Lights the colour of a step, which is weighted with its optical depth, by the gradient at a voxel place.
     pub(super) fn light(&self, depth: &mut [f32; 4], at: [f32; 3], direction: [f32; 3]) {
         let Some(facing) = self.facing(at, direction) else { return };
-        let highlight = light::SPECULAR as f32 * facing.powi(light::SHININESS as i32);
-        let shade = (light::AMBIENT + light::DIFFUSE * f64::from(facing)) as f32;
+        let [shade, highlight] = shine(facing);
         for c in 0..3 {
             depth[c] = (depth[c] * shade + depth[3] * highlight).clamp(0.0, depth[3]);
         }

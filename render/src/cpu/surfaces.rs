@@ -6,8 +6,9 @@
 //! opposite signs, also where it is 0: a ray through a shared edge crosses exactly one of them.
 
 use super::line::Rays;
+use super::shine::shine;
 use super::tiles::TILE;
-use crate::scene::{MeshItem, Shading, light};
+use crate::scene::{MeshItem, Shading};
 use crate::view::View;
 use crate::volume::Vector;
 
@@ -246,7 +247,7 @@ impl Facet {
             return color;
         }
         let facing = (self.normal.dot(&Vector::new(x, y, z)) / size).abs().min(1.0);
-        let highlight = light::SPECULAR * facing.powf(light::SHININESS);
-        color.map(|c| (c * (light::AMBIENT + light::DIFFUSE * facing) + highlight).clamp(0.0, 1.0))
+        let [shade, highlight] = shine(facing as f32).map(f64::from);
+        color.map(|c| (c * shade + highlight).clamp(0.0, 1.0))
     }
 }

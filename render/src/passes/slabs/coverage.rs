@@ -247,8 +247,9 @@ mod tests {
                     if ndc.iter().any(|c| c.abs() >= 1.0) || !(0.0..25.0).contains(&slab) {
                         continue;
                     }
-                    let tile =
-                        |a: usize, part: f64| (part * f64::from(size[a]) / f64::from(tiles.edge)) as u32;
+                    let tile = |a: usize, part: f64| {
+                        (part * 0.5 * f64::from(size[a]) / f64::from(tiles.edge)) as u32
+                    };
                     let (x, y) = (tile(0, 1.0 + ndc[0]), tile(1, 1.0 - ndc[1]));
                     assert!(coverage.has(slab as u32, [x, y]), "{at:?} in slab {slab}");
                     seen += 1;

@@ -38,7 +38,7 @@ struct Fragment {
     // Among the planes: five for each block whose outside is kept.
     block_first: u32,
     block_end: u32,
-    // What whole numbers of 16 bits stand for in the table: of the sums' rest, and of rises.
+    // What a 1 of 16 bits stands for in the table: of the sums' rest, and of rises.
     rest_scale: f32,
     rise_scale: f32,
     // The box that is drawn, in texture coordinates.
@@ -279,25 +279,26 @@ fn last_node() -> f32 {
 }
 
 // What a table holds at a position; the first and the last node go on without end. Its rows: the antiderivative at the
-// node, rounded; level of extinction; what the rounding left, and the rise of extinction; where a jump is.
+// node, rounded; level of extinction; what the rounding left, and the rise of extinction; extinction after a jump.
 fn look(position: f32, scalar: Scalar) -> Looked {
     let j = clamp(floor(position), 0.0, last_node());
     let at = vec2<u32>(u32(j), scalar.table_row);
     let sum = bitcast<vec4<f32>>(textureLoad(tables, at, 0));
-    let level = bitcast<vec4<f32>>(textureLoad(tables, at + vec2<u32>(0u, 1u), 0));
+    let level_bits = textureLoad(tables, at + vec2<u32>(0u, 1u), 0);
     let fine = textureLoad(tables, at + vec2<u32>(0u, 2u), 0);
     let rest = vec4<f32>(unpack2x16snorm(fine.x), unpack2x16snorm(fine.y)) * scalar.rest_scale;
-    let rise = vec4<f32>(unpack2x16snorm(fine.z), unpack2x16snorm(fine.w)) * scalar.rise_scale;
+    var level = bitcast<vec4<f32>>(level_bits);
+    var rise = vec4<f32>(unpack2x16float(fine.z), unpack2x16float(fine.w)) * scalar.rise_scale;
     let part = position - j;
     // Without a jump extinction is the level in the node's middle, and linear.
     var risen = part - 0.5;
     var sum_of_risen = 0.5 * part * (part - 1.0);
-    if JUMPS {
-        let split = bitcast<f32>(textureLoad(tables, at + vec2<u32>(0u, 3u), 0).x);
-        if split >= 0.0 {
-            risen = select(0.0, 1.0, part >= split);
-            sum_of_risen = max(part - split, 0.0);
-        }
+    if JUMPS && (level_bits.w >> 31u) == 1u {
+        level.w = -level.w;
+        rise = bitcast<vec4<f32>>(textureLoad(tables, at + vec2<u32>(0u, 3u), 0)) - level;
+        let split = bitcast<f32>(fine.z);
+        risen = select(0.0, 1.0, part >= split);
+        sum_of_risen = max(part - split, 0.0);
     }
     return Looked(position, sum, rest + part * level + sum_of_risen * rise, level + risen * rise);
 }
@@ -485,6 +486,34 @@ fn absorbed_per_depth(t: f32) -> f32 {
     return (1.0 - exp(-t)) / t;
 }
 
+// What has been met on the way so far: premultiplied colour and opacity.
+struct Met {
+    color: vec3<f32>,
+    alpha: f32,
+}
+
+// Passes optical depth x colour and optical depth.
+fn absorb(met: ptr<function, Met>, depth: vec4<f32>) {
+    let part = absorbed_per_depth(depth.a);
+    let through = 1.0 - (*met).alpha;
+    (*met).color += through * part * depth.rgb;
+    (*met).alpha += through * part * depth.a;
+}
+
+// Passes a surface.
+fn cross_surface(met: ptr<function, Met>, color: vec4<f32>) {
+    let through = 1.0 - (*met).alpha;
+    (*met).color += through * color.a * color.rgb;
+    (*met).alpha += through * color.a;
+}
+
+// Ends at the opaque surface, which was met before where it lies in front of the slab.
+fn end_at_wall(met: ptr<function, Met>, pixel: vec2<u32>, is_here: bool) {
+    let seen = select(0.0, 1.0 - (*met).alpha, is_here);
+    (*met).color += seen * textureLoad(opaque_color, pixel, 0).rgb;
+    (*met).alpha += seen;
+}
+
 @fragment
 fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
     let pixel = vec2<u32>(in.position.xy);
@@ -512,8 +541,7 @@ fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
         }
     }
 
-    var color = vec3<f32>(0.0);
-    var alpha = 0.0;
+    var met: Met;
     var k = 0u;
     // Each round takes a sub-step or a layer.
     var rounds = frame.steps;
@@ -539,30 +567,24 @@ fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
         if KIND_1 != KIND_NONE { sum += advance(KIND_1, &s1, ids[1], volume_1, end, ray); }
         if KIND_2 != KIND_NONE { sum += advance(KIND_2, &s2, ids[2], volume_2, end, ray); }
         if KIND_3 != KIND_NONE { sum += advance(KIND_3, &s3, ids[3], volume_3, end, ray); }
-        let part = absorbed_per_depth(sum.a);
-        color += (1.0 - alpha) * part * sum.rgb;
-        alpha += (1.0 - alpha) * part * sum.a;
+        absorb(&met, sum);
 
         var next = k + 1u;
         if SURFACES {
             let at_wall = wall < grid;
             let at_layer = layer != NO_LAYER && stop < grid && stop < wall;
             if at_layer {
-                let surface = layers[layer].color;
-                color += (1.0 - alpha) * surface.a * surface.rgb;
-                alpha += (1.0 - alpha) * surface.a;
+                cross_surface(&met, layers[layer].color);
                 layer = layer_after(pixel, layer);
                 next = k;
             } else if at_wall {
-                let seen = select(0.0, 1.0 - alpha, wall >= z0);
-                color += seen * textureLoad(opaque_color, pixel, 0).rgb;
-                alpha += seen;
+                end_at_wall(&met, pixel, wall >= z0);
                 next = frame.steps;
             }
         }
         k = next;
     }
-    return vec4<f32>(color, alpha);
+    return vec4<f32>(met.color, met.alpha);
 }
 
 // Where more fragments meet than there are slots, a slab is one sub-step: what each holds of optical depth x colour
@@ -614,8 +636,7 @@ fn fs_mix(in: VertexOut) -> @location(0) vec4<f32> {
             layer = first_layer(pixel, z0);
         }
     }
-    var color = vec3<f32>(0.0);
-    var alpha = 0.0;
+    var met: Met;
     var at = z0;
     var rounds = 1u;
     if LAYERS {
@@ -630,24 +651,17 @@ fn fs_mix(in: VertexOut) -> @location(0) vec4<f32> {
             stop = min(stop, layers[layer].zeta);
         }
         let end = clamp(stop, at, z1);
-        let depth = sum * (end - at);
-        let part = absorbed_per_depth(depth.a);
-        color += (1.0 - alpha) * part * depth.rgb;
-        alpha += (1.0 - alpha) * part * depth.a;
+        absorb(&met, sum * (end - at));
         at = end;
         if SURFACES {
             if LAYERS && layer != NO_LAYER && stop < z1 && stop < wall {
-                let surface = layers[layer].color;
-                color += (1.0 - alpha) * surface.a * surface.rgb;
-                alpha += (1.0 - alpha) * surface.a;
+                cross_surface(&met, layers[layer].color);
                 layer = layer_after(pixel, layer);
             } else if wall < z1 {
-                let seen = select(0.0, 1.0 - alpha, wall >= z0);
-                color += seen * textureLoad(opaque_color, pixel, 0).rgb;
-                alpha += seen;
+                end_at_wall(&met, pixel, wall >= z0);
                 at = z1;
             }
         }
     }
-    return vec4<f32>(color, alpha);
+    return vec4<f32>(met.color, met.alpha);
 }

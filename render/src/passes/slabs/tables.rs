@@ -22,7 +22,7 @@ pub(crate) struct GpuTable {
     pub(crate) origin: f64,
     /// First of its rows.
     pub(crate) row: u32,
-    /// What whole numbers of 16 bits stand for: of the sums' rest, and of rises.
+    /// What a 1 of 16 bits stands for: of the sums' rest, and of rises.
     pub(crate) rest_scale: f32,
     pub(crate) rise_scale: f32,
 }
@@ -75,7 +75,7 @@ impl TableCache {
         for part in 0..ROWS as usize {
             self.texels.extend(texels.iter().map(|t| t[part]));
         }
-        self.jumps |= packed.iter().any(|p| p.split >= 0.0);
+        self.jumps |= packed.iter().any(|p| p.jump.is_some());
         self.sent = None;
         let (step, origin) = (made.step, made.position(0.0));
         let table = Arc::new(GpuTable { step, origin, row, rest_scale, rise_scale });
@@ -127,48 +127,48 @@ struct Packed {
     /// Antiderivative at its begin: rounded, and what that left.
     sum: [f32; 4],
     rest: [f32; 4],
-    /// Extinction: without a jump mean and rise from begin to end, with one what it is before and its rise there.
+    /// Extinction without a jump: its mean, and its rise from begin to end.
     level: [f32; 4],
     rise: [f32; 4],
-    /// Where the jump is, 0 to 1; negative without one.
-    split: f32,
+    /// With one: where it is, 0 to 1, and what extinction is after it; `level` is what it is before.
+    jump: Option<(f32, [f32; 4])>,
 }
 
 impl Packed {
     fn new(node: &Node) -> Self {
         let sum = node.sum.map(|s| s as f32);
         let rest = std::array::from_fn(|c| (node.sum[c] - f64::from(sum[c])) as f32);
-        let linear = |[begin, end]: [Extinction; 2]| (-1.0, node.parts.mean([0.0, 1.0]), begin, end);
-        let (split, level, from, to) = match &node.parts {
-            Parts::Whole(ends) => linear(*ends),
+        let narrow = |e: Extinction| e.map(|v| v as f32);
+        let (mut level, mut rise, mut jump) = (narrow(node.parts.mean([0.0, 1.0])), [0.0; 4], None);
+        match &node.parts {
+            Parts::Whole([from, to]) => rise = std::array::from_fn(|c| (to[c] - from[c]) as f32),
             Parts::Jumps(parts) => {
-                let jump = |i: &usize| (parts[i + 1].ends[0][3] - parts[*i].ends[1][3]).abs();
-                let largest = (0..parts.len() - 1).max_by(|a, b| jump(a).total_cmp(&jump(b)));
-                match largest.map(|i| parts[i].end) {
-                    Some(split) => {
-                        let before = node.parts.mean([0.0, split]);
-                        (split, before, before, node.parts.mean([split, 1.0]))
-                    }
-                    None => linear(parts[0].ends),
+                let height = |i: &usize| (parts[i + 1].ends[0][3] - parts[*i].ends[1][3]).abs();
+                let largest = (0..parts.len() - 1).max_by(|a, b| height(a).total_cmp(&height(b)));
+                if let Some(split) = largest.map(|i| parts[i].end) {
+                    level = narrow(node.parts.mean([0.0, split]));
+                    jump = Some((split as f32, narrow(node.parts.mean([split, 1.0]))));
                 }
             }
-        };
-        let rise = std::array::from_fn(|c| (to[c] - from[c]) as f32);
-        Self { sum, rest, level: level.map(|v| v as f32), rise, split: split as f32 }
+        }
+        Self { sum, rest, level, rise, jump }
     }
 
     fn texels(&self, rest_scale: f32, rise_scale: f32) -> [[u32; 4]; ROWS as usize] {
-        let pair = |a: f32, b: f32, scale: f32| {
-            let [a, b] = [a, b].map(|v| (v / scale * 32767.0).round() as i16 as u16);
-            u32::from(a) | u32::from(b) << 16
-        };
-        let fine = [
-            pair(self.rest[0], self.rest[1], rest_scale),
-            pair(self.rest[2], self.rest[3], rest_scale),
-            pair(self.rise[0], self.rise[1], rise_scale),
-            pair(self.rise[2], self.rise[3], rise_scale),
-        ];
-        [self.sum.map(f32::to_bits), self.level.map(f32::to_bits), fine, [self.split.to_bits(), 0, 0, 0]]
+        let pair = |low: u16, high: u16| u32::from(low) | u32::from(high) << 16;
+        let rest = self.rest.map(|v| (v / rest_scale * 32767.0).round() as i16 as u16);
+        let rise = self.rise.map(|v| half::f16::from_f32(v / rise_scale).to_bits());
+        let mut fine =
+            [pair(rest[0], rest[1]), pair(rest[2], rest[3]), pair(rise[0], rise[1]), pair(rise[2], rise[3])];
+        let mut level = self.level.map(f32::to_bits);
+        let mut after = [0; 4];
+        if let Some((split, extinction)) = self.jump {
+            // The sign says that there is one: extinction has none.
+            level[3] |= 1 << 31;
+            (fine[2], fine[3]) = (split.to_bits(), 0);
+            after = extinction.map(f32::to_bits);
+        }
+        [self.sum.map(f32::to_bits), level, fine, after]
     }
 }
 
