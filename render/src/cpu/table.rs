@@ -111,7 +111,8 @@ impl Table {
         (&self.nodes[i], i, position - i as f32)
     }
 
-    /// The antiderivative from the begin of a node in which there are jumps, and extinction there.
+    /// The antiderivative from the begin of a node in which there are jumps, and extinction there. Before the first node,
+    /// `part` is negative: its first part goes on without end.
     #[cold]
     fn among_jumps(&self, node: usize, part: f32) -> ([f64; 4], [f64; 4]) {
         let (mut sum, mut rate, mut begin) = ([0.0; 4], [0.0; 4], 0.0);
@@ -119,7 +120,7 @@ impl Table {
         let known = self.jumps.iter().find(|j| j.node == node);
         for Part { end, ends: [a, b] } in known.into_iter().flat_map(|j| &j.parts) {
             let width = end - begin;
-            let inside = (part.min(*end) - begin).max(0.0);
+            let inside = part.min(*end) - begin;
             let share = inside / width;
             for c in 0..4 {
                 let here = a[c] + (b[c] - a[c]) * share;
@@ -240,6 +241,22 @@ mod tests {
                     known[c]
                 );
             }
+        }
+    }
+
+    #[test]
+    fn what_lies_before_a_jump_at_the_first_point_goes_on_without_end() {
+        let point = |value: f64, a: f64| ControlPoint { value, rgba: [1.0, 1.0, 1.0, a] };
+        let points = vec![point(0.0, 0.9), point(0.0, 0.1), point(10.0, 0.3)];
+        let transfer = Transfer::new(points, 1.0).expect("a function");
+        let samples = Samples::F32(vec![-500.0, 20.0]);
+        let grid = Grid::new([2, 1, 1], samples, Rescale::default(), Affine::identity()).expect("a grid");
+        let table = Table::new(&transfer, &grid);
+        let sum = |value: f64| table.sum(value as f32 * table.scale + table.offset)[3];
+        let known = transfer.extinction_of(0.9);
+        for [a, b] in [[-500.0, -499.0], [-30.0, -1.0], [-0.01, -0.001]] {
+            let found = (sum(b) - sum(a)) / ((b - a) * f64::from(table.scale));
+            assert!((found / known - 1.0).abs() < 1e-2, "{a} to {b}: {found} is not {known}");
         }
     }
 }
