@@ -58,6 +58,8 @@ fn rules() -> Vec<Rule> {
                     "crate::passes",
                     "crate::shader",
                     "crate::renderer",
+                    "crate::cells",
+                    "crate::cpu",
                 ],
             ]),
         ),
@@ -68,6 +70,23 @@ fn rules() -> Vec<Rule> {
                 &UI,
                 &GPU,
                 &["compress", "crate::reference", "crate::gpu", "crate::passes", "crate::texture"],
+            ]),
+        ),
+        rule(
+            &["render/src/cells/"],
+            &["render/src/cells/tests/"],
+            all(&[
+                &UI,
+                &GPU,
+                &[
+                    "compress",
+                    "crate::reference",
+                    "crate::cpu",
+                    "crate::gpu",
+                    "crate::passes",
+                    "crate::renderer",
+                    "crate::texture",
+                ],
             ]),
         ),
         rule(

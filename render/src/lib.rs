@@ -27,6 +27,7 @@
 //! - *Shewchuk 1997*: "Adaptive precision floating-point arithmetic and fast robust geometric predicates",
 //!   Discrete & Computational Geometry 18.
 
+pub mod cells;
 pub mod cpu;
 mod gather;
 pub mod gpu;

@@ -12,6 +12,8 @@
 //! 4. `integrate`: between two such places a rule of high order, halved until it holds.
 //! 5. `modes`: volumes that are not integrated but found as layers, by the same cubics.
 //!
+//! Unstructured grids have a page of their own, [`cells`].
+//!
 //! **Geometry** is relative to the camera's eye, so that a scene far from the origin keeps its digits.
 //! Lengths are world millimetres along the ray. Row 0 is the top one.
 //!
@@ -49,6 +51,7 @@
 //! - Butcher 1964, "Implicit Runge-Kutta processes", Mathematics of Computation 18; Hairer, Nørsett,
 //!   Wanner, "Solving Ordinary Differential Equations I", II.7.
 
+pub mod cells;
 mod class;
 mod cubic;
 mod field;

@@ -1,0 +1,225 @@
+//! From what a ray has of cells to segments: integrated, put in order of depth and merged where they meet.
+
+use std::cmp::Ordering;
+
+use super::scan::Raw;
+use super::table::{Table, opacity};
+
+/// A stretch of a pixel's ray with what is seen of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Segment {
+    /// Depth where it begins: millimetres before the eye plane, along the view (not along the ray).
+    pub front: f64,
+    /// Depth where it ends.
+    pub back: f64,
+    /// Red, green, blue, premultiplied, and opacity; 0 to 1.
+    pub rgba: [f32; 4],
+}
+
+/// So many are put in order by moving each to its place.
+const FEW: usize = 48;
+/// Opacity from which on a segment's optical depth is no more told apart: that of 16.
+const OPAQUE: f32 = 1.0 - 1e-7;
+
+impl Segment {
+    /// By depth, and where that is one by all the rest: the same for any order that segments were found in.
+    pub(super) fn order(&self, other: &Self) -> Ordering {
+        let rest = |s: &Self| s.rgba.map(f32::to_bits);
+        self.front
+            .total_cmp(&other.front)
+            .then_with(|| self.back.total_cmp(&other.back))
+            .then_with(|| rest(self).cmp(&rest(other)))
+    }
+
+    /// Optical depth times colour, and optical depth.
+    fn depth(&self) -> [f64; 4] {
+        let opacity = self.rgba[3].min(OPAQUE);
+        if opacity <= 0.0 {
+            return [0.0; 4];
+        }
+        let tau = -f64::from(-opacity).ln_1p();
+        let part = tau / f64::from(self.rgba[3]);
+        let [r, g, b, _] = self.rgba.map(|v| f64::from(v) * part);
+        [r, g, b, tau]
+    }
+
+    /// The part of it between two depths, as if it were the same all along.
+    pub(super) fn between(&self, [near, far]: [f64; 2]) -> Option<Self> {
+        let (front, back) = (self.front.max(near), self.back.min(far));
+        if front >= back {
+            return None;
+        }
+        if front == self.front && back == self.back {
+            return Some(*self);
+        }
+        let share = (back - front) / (self.back - self.front);
+        Some(Self { front, back, rgba: seen(self.depth().map(|d| d * share)) })
+    }
+}
+
+/// Colour, premultiplied, and opacity of an optical depth, given with its product with colour.
+fn seen(depth: [f64; 4]) -> [f32; 4] {
+    let depth = depth.map(|d| d as f32);
+    if depth[3] <= 0.0 {
+        return [0.0; 4];
+    }
+    let opacity = opacity(depth[3]);
+    let part = opacity / depth[3];
+    [depth[0] * part, depth[1] * part, depth[2] * part, opacity]
+}
+
+/// Puts `behind` under what is seen so far.
+#[inline(always)]
+pub(super) fn under(seen: &mut [f32; 4], behind: [f32; 4]) {
+    let through = 1.0 - seen[3];
+    for c in 0..4 {
+        seen[c] += through * behind[c];
+    }
+}
+
+/// Depths of one pixel at which no segment may go on, rising: common to all pixels, and its own.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Stops<'a> {
+    pub(super) common: &'a [f64],
+    pub(super) own: &'a [f64],
+}
+
+impl Stops<'_> {
+    fn is_empty(&self) -> bool {
+        self.common.is_empty() && self.own.is_empty()
+    }
+
+    /// The first behind a depth.
+    fn after(&self, depth: f64) -> f64 {
+        let first = |list: &[f64]| list.get(list.partition_point(|&d| d <= depth)).copied();
+        first(self.common).unwrap_or(f64::INFINITY).min(first(self.own).unwrap_or(f64::INFINITY))
+    }
+
+    fn holds(&self, depth: f64) -> bool {
+        let holds = |list: &[f64]| list.binary_search_by(|d| d.total_cmp(&depth)).is_ok();
+        holds(self.common) || holds(self.own)
+    }
+}
+
+/// Puts what a ray has of cells in order of depth, the same for any order it was found in.
+#[inline(always)]
+pub(super) fn sort(raws: &mut [Raw]) {
+    if raws.len() > FEW {
+        raws.sort_unstable_by(|a, b| {
+            let before = |a, b| if is_before(a, b) { Ordering::Less } else { Ordering::Equal };
+            before(a, b).then_with(|| before(b, a).reverse())
+        });
+        return;
+    }
+    for i in 1..raws.len() {
+        let raw = raws[i];
+        let mut at = i;
+        while at > 0 && is_before(&raw, &raws[at - 1]) {
+            raws[at] = raws[at - 1];
+            at -= 1;
+        }
+        raws[at] = raw;
+    }
+}
+
+#[inline(always)]
+fn is_before(a: &Raw, b: &Raw) -> bool {
+    if a.front != b.front {
+        return a.front < b.front;
+    }
+    let rest = |r: &Raw| (r.back.to_bits(), r.values.map(f32::to_bits));
+    // Depths are not negative: their bits are in their order.
+    rest(a) < rest(b)
+}
+
+/// Integrates what a ray has of cells, in their order; `stretch` is mm for one of depth. Segments are cut at `stops`.
+#[inline(always)]
+pub(super) fn integrate(
+    raws: &[Raw],
+    table: &Table,
+    stretch: f64,
+    stops: &Stops<'_>,
+    into: &mut Vec<Segment>,
+) {
+    let mut last = *table.start();
+    for raw in raws {
+        let [a, b] = raw.values;
+        let mut from = if a == Table::position_of(&last) { last } else { table.find(a, Table::piece(&last)) };
+        let mut front = raw.front;
+        if !stops.is_empty() {
+            let mut stop = stops.after(front);
+            while stop < raw.back {
+                let part = (stop - raw.front) / (raw.back - raw.front);
+                let to = table.find(a + (b - a) * part as f32, Table::piece(&from));
+                let mm = length(stop - front, stretch);
+                into.push(Segment { front, back: stop, rgba: table.segment(&from, &to, mm) });
+                (front, from) = (stop, to);
+                stop = stops.after(front);
+            }
+        }
+        let to = if a == b { from } else { table.find(b, Table::piece(&from)) };
+        let mm = length(raw.back - front, stretch);
+        into.push(Segment { front, back: raw.back, rgba: table.segment(&from, &to, mm) });
+        last = to;
+    }
+}
+
+/// Millimetres of a stretch of depth; beyond this much all is opaque or clear.
+#[inline(always)]
+fn length(depth: f64, stretch: f64) -> f32 {
+    (depth * stretch).min(1e20) as f32
+}
+
+/// Whether segments in order overlap.
+#[inline(always)]
+pub(super) fn overlap(segments: &[Segment]) -> bool {
+    segments.windows(2).any(|pair| pair[1].front < pair[0].back)
+}
+
+/// Replaces segments that overlap by segments that do not: where several are, their optical depths add up and colours are
+/// weighted by them, each taken as the same all along.
+pub(super) fn add_up(segments: &mut Vec<Segment>) {
+    // Rates of what begins and ends, by depth; in the order of the segments where depths are one.
+    let mut changes: Vec<(f64, bool, [f64; 4])> = Vec::with_capacity(2 * segments.len());
+    for s in segments.iter() {
+        let length = s.back - s.front;
+        let rate = s.depth().map(|d| d / length);
+        changes.push((s.front, true, rate));
+        changes.push((s.back, false, rate));
+    }
+    changes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    segments.clear();
+    let (mut open, mut rate, mut at) = (0_usize, [0.0_f64; 4], f64::NEG_INFINITY);
+    for (depth, begins, of) in changes {
+        if depth > at && open > 0 {
+            let rgba = seen(rate.map(|r| (r * (depth - at)).max(0.0)));
+            segments.push(Segment { front: at, back: depth, rgba });
+        }
+        at = depth;
+        if begins {
+            open += 1;
+            rate = std::array::from_fn(|c| rate[c] + of[c]);
+        } else {
+            open = open.saturating_sub(1);
+            // What rounding left does not stay.
+            rate = if open == 0 { [0.0; 4] } else { std::array::from_fn(|c| rate[c] - of[c]) };
+        }
+    }
+}
+
+/// Merges segments that meet, front to back, but not across `stops`.
+#[inline(always)]
+pub(super) fn merge(segments: &[Segment], stops: &Stops<'_>, mut done: impl FnMut(Segment)) {
+    let mut rest = segments.iter();
+    let Some(mut run) = rest.next().copied() else { return };
+    for next in rest {
+        if next.front == run.back && (stops.is_empty() || !stops.holds(run.back)) {
+            under(&mut run.rgba, next.rgba);
+            run.back = next.back;
+        } else {
+            done(run);
+            run = *next;
+        }
+    }
+    done(run);
+}

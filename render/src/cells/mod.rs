@@ -1,0 +1,482 @@
+//! Unstructured grids as volumes, by projection of their cells; on all cores, without a GPU.
+//!
+//! After Takayama et al., "Cell-projection parallel volume rendering with early ray termination":
+//!
+//! 1. `split`, `clusters`: cells become tetrahedra, the same across a shared face, in clusters of a few hundred near ones.
+//!    That is done once a grid.
+//! 2. `lens`, `scan`: each tetrahedron is projected and scan-converted: for every pixel whose ray passes it, where the ray
+//!    enters and leaves it, and the scalar there. Exact predicates decide which rays those are, and neighbours agree to the
+//!    bit about depth and scalar on the face that they share: no ray passes between two cells or through both at once.
+//! 3. `table`, `fold`: each stretch is integrated for a scalar that runs linearly and the transfer function as it is; a
+//!    cluster's stretches are put in order for each pixel and merged where they meet.
+//! 4. `lists`, `early`: each worker keeps a list of [`Segment`]s for each pixel; clusters and cells behind what is opaque are
+//!    left out, if asked for ([`Early`]).
+//! 5. `worker`, `wire`, `link`, `engine`: workers share out clusters and exchange lists, by messages ([`Link`]); then the
+//!    lists are composited in order of depth. Grids may be of several parts, not convex, and cells may lie in a circle before
+//!    each other.
+//!
+//! **Meaning**: that of `crate::reference::cells`. The scalar is linear within each tetrahedron; fields of cells are constant
+//! within each cell. Cells with a value that is not a number are left out, and counted. Where cells overlap, their optical
+//! depths add up, and colours are weighted by them, each cell or merged run of cells taken as the same all along its depth;
+//! grids that are sound have no such place.
+//!
+//! **Error**: below 1/255 in any channel; the parts that it is made of are said in `table`. With early termination, at most
+//! 1 - [`Early::threshold`] is added.
+//!
+//! **Same bytes**: without early termination the picture and the segments do not depend on the number of workers, on the
+//! order of the grid's cells, or on the processor's instructions. With it they depend on the workers' timing, within its bound.
+
+mod clusters;
+mod early;
+mod engine;
+mod fold;
+mod lens;
+mod link;
+mod lists;
+mod project;
+mod scan;
+mod split;
+mod spread;
+mod stats;
+mod table;
+#[cfg(test)]
+mod tests;
+mod wire;
+mod worker;
+
+pub use clusters::Faults;
+pub use early::Early;
+pub use engine::Engine;
+pub use fold::Segment;
+pub use link::{Link, LinkError};
+pub use project::Breaks;
+pub use spread::Spread;
+pub use stats::{Counts, Stats};
+
+use std::sync::{Arc, Weak};
+use std::time::Instant;
+
+use thiserror::Error;
+
+use crate::image::FloatImage;
+use crate::scene::{Camera, CameraError};
+use crate::view::View;
+use crate::volume::cells::{CellGrid, Field, Place};
+use crate::volume::{Affine, Transfer};
+use clusters::{Clusters, Scalars};
+use engine::Jobs;
+use lens::Lens;
+use project::Frame;
+use spread::queues;
+use table::Table;
+use worker::{Gathered, Manner, Worker};
+
+/// The largest picture: 16 384 × 16 384.
+pub const MAX_PIXELS: u64 = 1 << 28;
+
+/// Workers at most.
+pub const MAX_WORKERS: usize = 1024;
+
+/// Which scalar of a field is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// One component.
+    Component(usize),
+    /// The length of the tuple as a vector.
+    Magnitude,
+}
+
+/// A scalar of a grid.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Scalar {
+    /// Whether the field is on points or on cells.
+    pub place: Place,
+    /// The field's name.
+    pub name: String,
+    /// What of it.
+    pub part: Part,
+}
+
+/// A grid to draw.
+#[derive(Debug, Clone)]
+pub struct CellItem {
+    /// Points, cells and fields.
+    pub grid: Arc<CellGrid>,
+    /// Which of the grid's steps.
+    pub step: usize,
+    /// Which scalar.
+    pub scalar: Scalar,
+    /// `world_from_grid`.
+    pub pose: Affine,
+    /// Colour and opacity.
+    pub transfer: Arc<Transfer>,
+}
+
+/// How a picture of cells is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Whether, and when, what lies behind is given up.
+    pub early: Option<Early>,
+    /// How many workers; where none is said, one for each thread of the current pool.
+    pub workers: Option<usize>,
+    /// What drives them.
+    pub engine: Engine,
+    /// Which cells each worker begins with.
+    pub spread: Spread,
+    /// Whether a worker without cells takes a third of those of the one that has most.
+    pub balance: bool,
+    /// Whether workers tell each other which subscreens are terminated.
+    pub share: bool,
+    /// Whether cells that the transfer function makes clear are left out. The picture is the same either way.
+    pub skip_clear: bool,
+    /// Whether the segments of each pixel are handed out, beside the picture.
+    pub keep_segments: bool,
+    /// Whether the machine's widest instructions are used. The picture is the same either way.
+    pub wide: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            early: None,
+            workers: None,
+            engine: Engine::Threads,
+            spread: Spread::Columns,
+            balance: true,
+            share: true,
+            skip_clear: true,
+            keep_segments: false,
+            wide: true,
+        }
+    }
+}
+
+/// Why there is no picture of cells.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CellsError {
+    /// The camera shows nothing.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// A side is zero, or there are more pixels than [`MAX_PIXELS`].
+    #[error("a picture of {width} by {height} pixels cannot be drawn: take 1 to {MAX_PIXELS} pixels in all")]
+    Size {
+        /// As asked for.
+        width: u32,
+        /// As asked for.
+        height: u32,
+    },
+    /// The grid has no such step.
+    #[error("the grid has no step {step}, only {count}")]
+    Step {
+        /// As asked for, from 0.
+        step: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// The step has no such field, or the field no such component.
+    #[error("the grid has no field \"{name}\" with that component at that place")]
+    Field {
+        /// As asked for.
+        name: String,
+    },
+    /// The numbers of early termination are out of their ranges.
+    #[error(
+        "early termination needs a threshold between 0 and 1, and numbers of subscreens and refreshes above 0"
+    )]
+    Early,
+    /// Depths do not rise, or are not as many as the pixels need.
+    #[error("the depths at which segments are to end do not rise, or do not fit to the picture")]
+    Breaks,
+    /// There is no worker, or there are more than [`MAX_WORKERS`].
+    #[error("a picture takes 1 to {MAX_WORKERS} workers")]
+    Workers,
+    /// Workers cannot go on together.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The caller said to stop.
+    #[error("drawing was cancelled")]
+    Cancelled,
+}
+
+/// A picture of cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellPicture {
+    /// Premultiplied, without background.
+    pub image: FloatImage,
+    /// What it is made of, where asked for.
+    pub segments: Option<Segments>,
+    /// How it came about.
+    pub stats: Stats,
+}
+
+/// The segments of every pixel, nearest first; no two of a pixel overlap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Segments {
+    width: u32,
+    /// Where each pixel's begin, and at the end how many there are.
+    starts: Vec<usize>,
+    list: Vec<Segment>,
+}
+
+impl Segments {
+    /// The segments of a pixel; none for one outside the picture.
+    pub fn pixel(&self, x: u32, y: u32) -> &[Segment] {
+        let pixel = y as usize * self.width as usize + x as usize;
+        match self.starts.get(pixel..pixel + 2) {
+            Some(&[from, to]) if x < self.width => &self.list[from..to],
+            _ => &[],
+        }
+    }
+
+    /// What is seen of a pixel between two depths (mm before the eye plane): colour, premultiplied, and opacity. A segment that
+    /// only partly lies between them counts as the same all along; where it must be exact, draw with [`Breaks`] there.
+    pub fn between(&self, x: u32, y: u32, depths: [f64; 2]) -> [f32; 4] {
+        let mut seen = [0.0; 4];
+        for part in self.pixel(x, y).iter().filter_map(|segment| segment.between(depths)) {
+            fold::under(&mut seen, part.rgba);
+        }
+        seen
+    }
+}
+
+/// A grid that was made ready.
+#[derive(Debug)]
+struct Kept {
+    grid: Weak<CellGrid>,
+    clusters: Clusters,
+    scalars: Option<(usize, Scalar, Scalars)>,
+}
+
+/// Draws grids. Keeps what it has made ready of a grid for as long as the grid lives.
+#[derive(Debug, Default)]
+pub struct CellRenderer {
+    kept: Vec<Kept>,
+}
+
+impl CellRenderer {
+    /// A renderer that knows no grid yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Draws a picture of `size`, `[width, height]`.
+    ///
+    /// `progress` is told, from any thread, about how many clusters of cells are done and of how many; as soon as it answers
+    /// `false` the drawing stops.
+    ///
+    /// # Errors
+    /// All of [`CellsError`].
+    pub fn render(
+        &mut self,
+        item: &CellItem,
+        camera: &Camera,
+        size: [u32; 2],
+        options: &Options,
+        breaks: Breaks<'_>,
+        progress: &(dyn Fn(usize, usize) -> bool + Sync),
+    ) -> Result<CellPicture, CellsError> {
+        let count = options.workers.unwrap_or_else(rayon::current_num_threads);
+        let ready = self.ready(item, camera, size, options, breaks)?;
+        let (frame, manner) = (ready.frame(), ready.manner(options));
+        if count == 0 || count > MAX_WORKERS {
+            return Err(CellsError::Workers);
+        }
+        let jobs = Jobs { queues: queues(&frame, count, options.spread), progress };
+        let gathered = options.engine.run(&frame, manner, jobs)?;
+        Ok(ready.picture(gathered, options))
+    }
+
+    /// Does the part of one worker of a group, each in a process of its own with the same grid, and all with the same
+    /// arguments but the link. The first has the picture; the others have nothing.
+    ///
+    /// # Errors
+    /// All of [`CellsError`].
+    pub fn render_as(
+        &mut self,
+        item: &CellItem,
+        camera: &Camera,
+        size: [u32; 2],
+        options: &Options,
+        breaks: Breaks<'_>,
+        link: impl Link,
+    ) -> Result<Option<CellPicture>, CellsError> {
+        let ready = self.ready(item, camera, size, options, breaks)?;
+        let (frame, manner) = (ready.frame(), ready.manner(options));
+        let (rank, count) = (link.rank(), link.size());
+        if rank >= count || count > MAX_WORKERS {
+            return Err(CellsError::Workers);
+        }
+        let mut queues = queues(&frame, count, options.spread);
+        let left = queues.iter().map(|q| q.len() as u32).collect();
+        let queue = std::mem::take(&mut queues[rank]);
+        let gathered = engine::run(Worker::new(&frame, manner, link, queue, left), || true)?;
+        Ok((rank == 0).then(|| ready.picture(gathered, options)))
+    }
+
+    /// Checks what is asked for, and makes ready what is not.
+    fn ready<'a>(
+        &'a mut self,
+        item: &CellItem,
+        camera: &Camera,
+        size: [u32; 2],
+        options: &Options,
+        breaks: Breaks<'a>,
+    ) -> Result<Ready<'a>, CellsError> {
+        let begin = Instant::now();
+        let [width, height] = size;
+        let pixels = u64::from(width) * u64::from(height);
+        if pixels == 0 || pixels > MAX_PIXELS {
+            return Err(CellsError::Size { width, height });
+        }
+        if options.early.is_some_and(|early| {
+            !(early.threshold > 0.0 && early.threshold < 1.0)
+                || early.refreshes == 0
+                || early.subscreens == Some(0)
+        }) {
+            return Err(CellsError::Early);
+        }
+        if !breaks.fit(pixels as usize) {
+            return Err(CellsError::Breaks);
+        }
+        let view = View::new(camera, size)?;
+        let steps = item.grid.steps();
+        let missing = CellsError::Step { step: item.step, count: steps.len() };
+        let step = steps.get(item.step).ok_or(missing)?;
+        let field = step.field(item.scalar.place, &item.scalar.name).filter(|field| match item.scalar.part {
+            Part::Component(c) => c < field.components(),
+            Part::Magnitude => true,
+        });
+        let field = field.ok_or_else(|| CellsError::Field { name: item.scalar.name.clone() })?;
+        self.kept.retain(|kept| kept.grid.strong_count() > 0);
+        let same = |kept: &Kept| kept.grid.as_ptr() == Arc::as_ptr(&item.grid);
+        let index = self.kept.iter().position(same).unwrap_or_else(|| {
+            let clusters = Clusters::new(&item.grid);
+            self.kept.push(Kept { grid: Arc::downgrade(&item.grid), clusters, scalars: None });
+            self.kept.len() - 1
+        });
+        let Kept { clusters, scalars, .. } = &mut self.kept[index];
+        let known = scalars.take().filter(|(s, scalar, _)| (*s, scalar) == (item.step, &item.scalar));
+        let (_, _, scalars) = scalars.insert(known.unwrap_or_else(|| {
+            let values = Scalars::new(clusters, item.scalar.place, |n| value(field, item.scalar.part, n));
+            (item.step, item.scalar.clone(), values)
+        }));
+        let prepare_ms = begin.elapsed().as_secs_f64() * 1e3;
+        Ok(Ready {
+            clusters,
+            scalars,
+            table: Table::new(&item.transfer),
+            lens: Lens::new(&view, &item.pose),
+            size,
+            breaks,
+            skip_clear: options.skip_clear,
+            wide: options.wide && has_wide(),
+            prepare_ms,
+            begin: Instant::now(),
+        })
+    }
+}
+
+fn value(field: &Field, part: Part, tuple: usize) -> f64 {
+    match part {
+        Part::Component(c) => field.value(tuple, c),
+        Part::Magnitude => field.magnitude(tuple),
+    }
+}
+
+/// Whether the machine has AVX2 and what goes with it.
+fn has_wide() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    {
+        is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
+/// What a picture is drawn from.
+struct Ready<'a> {
+    clusters: &'a Clusters,
+    scalars: &'a Scalars,
+    table: Table,
+    lens: Lens,
+    size: [u32; 2],
+    breaks: Breaks<'a>,
+    skip_clear: bool,
+    wide: bool,
+    prepare_ms: f64,
+    begin: Instant,
+}
+
+impl Ready<'_> {
+    fn frame(&self) -> Frame<'_> {
+        Frame {
+            clusters: self.clusters,
+            scalars: self.scalars,
+            table: &self.table,
+            lens: self.lens,
+            size: self.size,
+            breaks: self.breaks,
+            skip_clear: self.skip_clear,
+            wide: self.wide,
+        }
+    }
+
+    fn manner(&self, options: &Options) -> Manner {
+        let side = options.early.map_or(1, |early| self.side(&early));
+        let Options { early, share, balance, keep_segments: keep, .. } = *options;
+        Manner { early, side, share, balance, keep }
+    }
+
+    /// Pixels that a subscreen is wide: half of what a cell is in the picture, since a cell may lie in several.
+    fn side(&self, early: &Early) -> usize {
+        let longer = self.size[0].max(self.size[1]);
+        if let Some(count) = early.subscreens {
+            return longer.div_ceil(count.max(1)).max(1) as usize;
+        }
+        let (mut sum, mut cells) = (0.0, 0.0);
+        let frame = self.frame();
+        for cluster in 0..self.clusters.len() {
+            let (reach, nearest) = frame.reach(cluster);
+            if !reach.is_empty() {
+                let count = self.clusters.count(cluster) as f64;
+                let wide = self.clusters.cell_mm(cluster) * self.lens.pixels_per_mm(nearest);
+                sum += wide.min(f64::from(longer)) * count;
+                cells += count;
+            }
+        }
+        if cells > 0.0 { (0.5 * sum / cells).ceil().clamp(1.0, 64.0) as usize } else { 16 }
+    }
+
+    fn picture(&self, gathered: Gathered, options: &Options) -> CellPicture {
+        let [width, height] = self.size;
+        let mut image = FloatImage { width, height, pixels: Vec::new() };
+        let mut segments = Segments { width, starts: vec![0], list: Vec::new() };
+        for row in gathered.rows {
+            image.pixels.extend(row.colors);
+            for count in row.counts {
+                let last = segments.starts[segments.starts.len() - 1];
+                segments.starts.push(last + count as usize);
+            }
+            segments.list.extend(row.segments);
+        }
+        let mut stats = Stats {
+            tetrahedra: (0..self.clusters.len()).map(|c| self.clusters.count(c) as u64).sum(),
+            faults: self.clusters.faults,
+            prepare_ms: self.prepare_ms,
+            ..Stats::default()
+        };
+        if let Some(early) = &options.early {
+            stats.subscreens = width.max(height).div_ceil(self.side(early) as u32);
+        }
+        for counts in &gathered.counts {
+            stats.total.add(*counts);
+        }
+        stats.workers = gathered.counts;
+        stats.frame_ms = self.begin.elapsed().as_secs_f64() * 1e3;
+        CellPicture { image, segments: options.keep_segments.then_some(segments), stats }
+    }
+}

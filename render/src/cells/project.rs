@@ -1,0 +1,302 @@
+//! One cluster of cells, from points to segments of pixels.
+
+use super::clusters::{Clusters, Scalars};
+use super::early;
+use super::fold::{Segment, Stops, add_up, integrate, merge, overlap, sort};
+use super::lens::Lens;
+use super::scan::{Corner, Raw, Rect, scan};
+use super::stats::Counts;
+use super::table::Table;
+use crate::volume::cells::Place;
+
+/// Pixels that a cluster is drawn in at once, across and down: what it makes there has to be remembered.
+const TILE: i32 = 128;
+
+/// Depths at which segments end, so that other things can be put between them.
+///
+/// A volume or surface that lies among the cells is merged exactly where segments end at it: name the depths of the
+/// surface's crossings for each pixel, or of the planes of a stack of slabs.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Breaks<'a> {
+    /// Depths for all pixels, mm before the eye plane, rising.
+    pub planes: &'a [f64],
+    /// For each pixel, row by row from the top, where its own depths begin in `depths`, and at the end how many there are;
+    /// empty where no pixel has any.
+    pub starts: &'a [u32],
+    /// The pixels' own depths, rising within each.
+    pub depths: &'a [f64],
+}
+
+impl<'a> Breaks<'a> {
+    /// Whether the lists fit to a picture.
+    pub(super) fn fit(&self, pixels: usize) -> bool {
+        let rising = |list: &[f64]| list.windows(2).all(|w| w[0] <= w[1]) && !list.iter().any(|d| d.is_nan());
+        let own =
+            self.starts.windows(2).all(|w| self.depths.get(w[0] as usize..w[1] as usize).is_some_and(rising));
+        rising(self.planes) && own && (self.starts.is_empty() || self.starts.len() == pixels + 1)
+    }
+
+    pub(super) fn pixel(&self, pixel: usize) -> Stops<'a> {
+        let own = match self.starts.get(pixel..pixel + 2) {
+            Some(&[from, to]) => &self.depths[from as usize..to as usize],
+            _ => &[],
+        };
+        Stops { common: self.planes, own }
+    }
+}
+
+/// What is drawn, for all workers.
+#[derive(Debug)]
+pub(super) struct Frame<'a> {
+    pub(super) clusters: &'a Clusters,
+    pub(super) scalars: &'a Scalars,
+    pub(super) table: &'a Table,
+    pub(super) lens: Lens,
+    pub(super) size: [u32; 2],
+    pub(super) breaks: Breaks<'a>,
+    /// Whether what the transfer function makes clear is left out.
+    pub(super) skip_clear: bool,
+    pub(super) wide: bool,
+}
+
+impl Frame<'_> {
+    pub(super) fn rect(&self) -> Rect {
+        Rect { low: [0; 2], high: self.size.map(|n| i32::try_from(n).unwrap_or(i32::MAX)) }
+    }
+
+    /// The pixels that a cluster may show in, and its nearest depth.
+    pub(super) fn reach(&self, cluster: usize) -> (Rect, f64) {
+        let corners = self.clusters.corners(cluster).map(|p| self.lens.place(&p));
+        let nearest = corners.iter().fold(f64::INFINITY, |near, c| near.min(c.z));
+        let farthest = corners.iter().fold(f64::NEG_INFINITY, |far, c| far.max(c.z));
+        // Rounding must not take the outermost pixels away.
+        let mut rect = Rect::around(&corners, &self.rect());
+        rect = Rect { low: rect.low.map(|v| v - 1), high: rect.high.map(|v| v.saturating_add(1)) }
+            .meet(&self.rect());
+        if farthest <= 0.0 {
+            rect.high = rect.low;
+        }
+        (rect, nearest)
+    }
+}
+
+/// A tetrahedron in a tile.
+#[derive(Debug, Clone, Copy)]
+struct Shown {
+    tetrahedron: u32,
+    reach: Rect,
+}
+
+/// What is kept from cluster to cluster.
+#[derive(Debug, Default)]
+pub(super) struct Projector {
+    values: Vec<f64>,
+    corners: Vec<Corner>,
+    shown: Vec<Shown>,
+    raws: Vec<Raw>,
+    counts: Vec<u32>,
+    ordered: Vec<Raw>,
+    spans: Vec<Segment>,
+    /// Runs of a cluster, for a worker that cannot take them while it is drawn.
+    pub(super) runs: Vec<(usize, Segment)>,
+}
+
+impl Projector {
+    /// Draws a cluster: hands on segments with the pixels they are of.
+    pub(super) fn draw(
+        &mut self,
+        frame: &Frame<'_>,
+        cluster: usize,
+        early: Option<&early::Table>,
+        counts: &mut Counts,
+        mut done: impl FnMut(usize, Segment),
+    ) {
+        if !frame.wide {
+            self.project(frame, cluster, early, counts, &mut done);
+            return;
+        }
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+            fn wide(
+                projector: &mut Projector,
+                frame: &Frame<'_>,
+                cluster: usize,
+                early: Option<&early::Table>,
+                counts: &mut Counts,
+                done: &mut impl FnMut(usize, Segment),
+            ) {
+                projector.project(frame, cluster, early, counts, done);
+            }
+            #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
+            // SAFETY: `wide` is set only where these instructions were detected.
+            unsafe {
+                wide(self, frame, cluster, early, counts, &mut done);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn project(
+        &mut self,
+        frame: &Frame<'_>,
+        cluster: usize,
+        early: Option<&early::Table>,
+        counts: &mut Counts,
+        done: &mut impl FnMut(usize, Segment),
+    ) {
+        let count = frame.clusters.count(cluster) as u64;
+        let (reach, nearest) = frame.reach(cluster);
+        if reach.is_empty() {
+            counts.outside += count;
+            return;
+        }
+        if frame.skip_clear && frame.table.is_clear(frame.scalars.range(cluster)) {
+            counts.clear += count;
+            return;
+        }
+        if early.is_some_and(|table| table.hides(&reach, nearest)) {
+            counts.hidden += count;
+            return;
+        }
+        let of_points = frame.scalars.place() == Place::Points;
+        let raw = frame.scalars.of(frame.clusters, cluster);
+        self.values.clear();
+        self.values.extend(raw.iter().map(|&v| frame.table.position(v)));
+        self.corners.clear();
+        let points = frame.clusters.points(cluster).iter().enumerate();
+        let values = &self.values;
+        self.corners
+            .extend(points.map(|(i, p)| frame.lens.corner(p, if of_points { values[i] } else { 0.0 })));
+        self.choose(frame, cluster, &reach, early, counts);
+        let mut top = reach.low[1];
+        while top < reach.high[1] {
+            let mut left = reach.low[0];
+            while left < reach.high[0] {
+                let tile = Rect { low: [left, top], high: [left + TILE, top + TILE] }.meet(&reach);
+                self.convert(frame, cluster, &tile, counts, done);
+                left += TILE;
+            }
+            top += TILE;
+        }
+    }
+
+    /// Decides which tetrahedra of a cluster are scan-converted.
+    #[inline(always)]
+    fn choose(
+        &mut self,
+        frame: &Frame<'_>,
+        cluster: usize,
+        reach: &Rect,
+        early: Option<&early::Table>,
+        counts: &mut Counts,
+    ) {
+        self.shown.clear();
+        let of_points = frame.scalars.place() == Place::Points;
+        let raw = frame.scalars.of(frame.clusters, cluster);
+        for (index, tetrahedron) in frame.clusters.tetrahedra(cluster).iter().enumerate() {
+            let corners = tetrahedron.map(|v| &self.corners[v as usize]);
+            let values = if of_points { tetrahedron.map(|v| raw[v as usize]) } else { [raw[index]; 4] };
+            let sum: f64 = corners.iter().map(|c| c.x + c.y + c.z).sum::<f64>() + values.iter().sum::<f64>();
+            if !sum.is_finite() {
+                counts.not_finite += 1;
+                continue;
+            }
+            let [mut low, mut high, mut nearest, mut farthest] =
+                [values[0], values[0], corners[0].z, corners[0].z];
+            for i in 1..4 {
+                (low, high) = (low.min(values[i]), high.max(values[i]));
+                (nearest, farthest) = (nearest.min(corners[i].z), farthest.max(corners[i].z));
+            }
+            if frame.skip_clear && frame.table.is_clear([low, high]) {
+                counts.clear += 1;
+                continue;
+            }
+            let mine = Rect::around(corners, reach);
+            if mine.is_empty() || farthest <= 0.0 {
+                counts.outside += 1;
+                continue;
+            }
+            if early.is_some_and(|table| table.hides(&mine, nearest)) {
+                counts.hidden += 1;
+                continue;
+            }
+            counts.scanned += 1;
+            self.shown.push(Shown { tetrahedron: index as u32, reach: mine });
+        }
+    }
+
+    /// Scan-converts what is chosen, in one tile, and merges it.
+    #[inline(always)]
+    fn convert(
+        &mut self,
+        frame: &Frame<'_>,
+        cluster: usize,
+        tile: &Rect,
+        counts: &mut Counts,
+        done: &mut impl FnMut(usize, Segment),
+    ) {
+        self.counts.clear();
+        self.counts.resize(tile.area(), 0);
+        self.raws.clear();
+        self.scan(frame, cluster, tile);
+        counts.segments += self.raws.len() as u64;
+        // Each pixel's together: where they begin, then one after the other.
+        let mut begin = 0;
+        for count in &mut self.counts {
+            (*count, begin) = (begin, begin + *count);
+        }
+        let Some(&any) = self.raws.first() else { return };
+        self.ordered.clear();
+        self.ordered.resize(self.raws.len(), any);
+        for raw in &self.raws {
+            let place = &mut self.counts[raw.pixel as usize];
+            self.ordered[*place as usize] = *raw;
+            *place += 1;
+        }
+        let [across, _] = tile.size();
+        let mut from = 0;
+        for (y, row) in (tile.low[1]..).zip(self.counts.chunks_exact(across)) {
+            let first = y as usize * frame.size[0] as usize;
+            for (x, &to) in (tile.low[0]..).zip(row) {
+                let to = to as usize;
+                if to == from {
+                    continue;
+                }
+                let pixel = first + x as usize;
+                let raws = &mut self.ordered[from..to];
+                from = to;
+                sort(raws);
+                let stops = frame.breaks.pixel(pixel);
+                self.spans.clear();
+                integrate(raws, frame.table, frame.lens.stretch([x, y]), &stops, &mut self.spans);
+                if overlap(&self.spans) {
+                    counts.overlaps += 1;
+                    add_up(&mut self.spans);
+                }
+                merge(&self.spans, &stops, |run| {
+                    if run.rgba[3] > 0.0 {
+                        counts.runs += 1;
+                        done(pixel, run);
+                    }
+                });
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn scan(&mut self, frame: &Frame<'_>, cluster: usize, tile: &Rect) {
+        let tetrahedra = frame.clusters.tetrahedra(cluster);
+        let constant = frame.scalars.place() == Place::Cells;
+        for shown in &self.shown {
+            let reach = shown.reach.meet(tile);
+            if reach.is_empty() {
+                continue;
+            }
+            let index = shown.tetrahedron as usize;
+            let corners = tetrahedra[index].map(|v| &self.corners[v as usize]);
+            let value = constant.then(|| self.values[index] as f32);
+            scan(corners, value, [tile, &reach], &mut self.counts, &mut self.raws);
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! Scan conversion: which pixels' rays pass a tetrahedron, and where they enter and leave it.
+//!
+//! A corner before the camera is a point (x, y, w) of the projective plane, in pixels, where whole numbers are the
+//! middles of pixels; w is 1 but for corners beside or behind a perspective eye, which no division reaches. About the
+//! ray of pixel (i, j) it is (x - i·w, y - j·w), an arithmetic that depends on the corner and the ray alone. From there
+//! on the side of an edge on which the ray passes is exact: the sign of a 2 by 2 determinant of two products, which
+//! rounding cannot turn round unless both round to one number, and then their remainders decide. Where the ray meets an
+//! edge it is taken as moved by (ε, ε²), and where two corners fall on one point as moved apart in the order of
+//! their numbers (Edelsbrunner, Mücke 1990). So cells that share an edge or a face agree on it: each ray passes a
+//! face of both or of neither.
+//!
+//! Depth and value on a face are the mean of its corners', weighted by the areas that the ray makes with its edges, added
+//! up in the order of the corners' numbers: cells that share the face get the same bits.
+
+use std::cmp::Ordering;
+
+/// Pixels that go at once.
+const LANES: usize = 4;
+
+/// A corner before the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Corner {
+    /// Place in the picture, pixels, times w.
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) w: f64,
+    /// Depth of a mean of corners is the mean of `depth` over the mean of `weight`.
+    pub(super) depth: f64,
+    pub(super) weight: f64,
+    /// The scalar times `weight`.
+    pub(super) value: f64,
+    /// Depth of the corner itself; mm before the eye plane.
+    pub(super) z: f64,
+}
+
+/// Pixels from `low` up to but not at `high`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Rect {
+    pub(super) low: [i32; 2],
+    pub(super) high: [i32; 2],
+}
+
+impl Rect {
+    #[inline(always)]
+    pub(super) fn is_empty(&self) -> bool {
+        self.low[0] >= self.high[0] || self.low[1] >= self.high[1]
+    }
+
+    #[inline(always)]
+    pub(super) fn meet(&self, other: &Self) -> Self {
+        Self {
+            low: [0, 1].map(|a| self.low[a].max(other.low[a])),
+            high: [0, 1].map(|a| self.high[a].min(other.high[a])),
+        }
+    }
+
+    pub(super) fn size(&self) -> [usize; 2] {
+        [0, 1].map(|a| usize::try_from(self.high[a] - self.low[a]).unwrap_or(0))
+    }
+
+    /// How many pixels.
+    pub(super) fn area(&self) -> usize {
+        self.size().into_iter().product()
+    }
+
+    /// The pixels whose rays may pass between corners: all of `within` where one of them is not before the eye.
+    #[inline(always)]
+    pub(super) fn around<'a>(corners: impl IntoIterator<Item = &'a Corner>, within: &Self) -> Self {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for c in corners {
+            if c.w != 1.0 {
+                return *within;
+            }
+            low = [low[0].min(c.x), low[1].min(c.y)];
+            high = [high[0].max(c.x), high[1].max(c.y)];
+        }
+        // `as` saturates; one more keeps the range half open.
+        let found = Self {
+            low: low.map(|v| v.ceil() as i32),
+            high: high.map(|v| (v.floor() as i32).saturating_add(1)),
+        };
+        found.meet(within)
+    }
+}
+
+/// What a ray has of one cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Raw {
+    /// Depth where it enters and leaves; mm before the eye plane.
+    pub(super) front: f64,
+    pub(super) back: f64,
+    /// The scalar there.
+    pub(super) values: [f32; 2],
+    /// Which of the rectangle's, row by row.
+    pub(super) pixel: u32,
+}
+
+/// Corners of an edge.
+const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+/// Corners of a face, and for each the edge across from it.
+const FACES: [([usize; 3], [usize; 3]); 4] =
+    [([1, 2, 3], [5, 4, 3]), ([0, 2, 3], [5, 2, 1]), ([0, 1, 3], [4, 2, 0]), ([0, 1, 2], [3, 1, 0])];
+/// A ray that misses.
+const MISS: u8 = u8::MAX;
+/// By the sides of the six edges, a bit each: the two faces that the ray passes, four times the one plus the other.
+const PASSED: [u8; 64] = passed();
+
+const fn passed() -> [u8; 64] {
+    let mut table = [MISS; 64];
+    let mut code = 0;
+    while code < 64 {
+        let (mut faces, mut count, mut f) = (0, 0, 0);
+        while f < 4 {
+            let across = FACES[f].1;
+            // Between the three edges i-j, j-k and i-k; the last is gone round the other way.
+            let [jk, ik, ij] = [(code >> across[0]) & 1, (code >> across[1]) & 1, (code >> across[2]) & 1];
+            if ij == jk && ij != ik {
+                faces = faces * 4 + f as u8;
+                count += 1;
+            }
+            f += 1;
+        }
+        if count == 2 {
+            table[code] = faces;
+        }
+        code += 1;
+    }
+    table
+}
+
+/// Adds what the rays of `reach`, which lies within `rect`, have of a tetrahedron. Its corners stand in the order of their
+/// numbers; `constant` is the cell's own value, where it has one. Each segment is counted at its pixel of `rect`.
+#[inline(always)]
+pub(super) fn scan(
+    corners: [&Corner; 4],
+    constant: Option<f32>,
+    [rect, reach]: [&Rect; 2],
+    counts: &mut [u32],
+    found: &mut Vec<Raw>,
+) {
+    let fields = corners.map(|c| [c.weight, c.depth, c.value]);
+    let width = rect.high[0] - rect.low[0];
+    for j in reach.low[1]..reach.high[1] {
+        let row = (j - rect.low[1]) * width - rect.low[0];
+        let y = corners.map(|c| c.y - f64::from(j) * c.w);
+        let mut i = reach.low[0];
+        while i < reach.high[0] {
+            let mut x = [[0.0; LANES]; 4];
+            for (x, c) in x.iter_mut().zip(corners) {
+                for (lane, x) in x.iter_mut().enumerate() {
+                    *x = c.x - f64::from(i + lane as i32) * c.w;
+                }
+            }
+            let mut areas = [[0.0; LANES]; 6];
+            let mut sides = [0_u64; LANES];
+            let mut least = [f64::INFINITY; LANES];
+            for (edge, [a, b]) in EDGES.into_iter().enumerate() {
+                for lane in 0..LANES {
+                    let area = x[a][lane] * y[b] - y[a] * x[b][lane];
+                    sides[lane] |= (area.to_bits() >> 63) << edge;
+                    let size = area.abs();
+                    areas[edge][lane] = size;
+                    least[lane] = if size < least[lane] { size } else { least[lane] };
+                }
+            }
+            let lanes = LANES.min((reach.high[0] - i) as usize);
+            if least.contains(&0.0) {
+                for lane in (0..lanes).filter(|&lane| least[lane] == 0.0) {
+                    sides[lane] = exact_sides(&corners, [i + lane as i32, j]);
+                }
+            }
+            // Which lanes pass is as good as random: found without a branch for each.
+            let passed = sides.map(|sides| PASSED[(sides & 63) as usize]);
+            let mut left = 0;
+            for (lane, faces) in passed.iter().enumerate() {
+                left |= u32::from(*faces != MISS) << lane;
+            }
+            left &= (1 << lanes) - 1;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize & (LANES - 1);
+                left &= left - 1;
+                let faces = passed[lane];
+                let a = pass(&fields, faces >> 2, &areas, lane);
+                let b = pass(&fields, faces, &areas, lane);
+                let in_order = a[0] <= b[0];
+                let [mut front, mut from] = if in_order { a } else { b };
+                let [back, to] = if in_order { b } else { a };
+                if !(back > 0.0 && back > front) {
+                    continue;
+                }
+                if front < 0.0 {
+                    from += (to - from) * (front / (front - back));
+                    front = 0.0;
+                }
+                let pixel = (row + i + lane as i32) as u32;
+                let values = constant.map_or([from as f32, to as f32], |value| [value; 2]);
+                counts[pixel as usize] += 1;
+                found.push(Raw { front, back, values, pixel });
+            }
+            i += LANES as i32;
+        }
+    }
+}
+
+/// Depth and scalar where a ray passes a face; `fields` are weight, depth and value of each corner.
+#[inline(always)]
+fn pass(fields: &[[f64; 3]; 4], face: u8, areas: &[[f64; LANES]; 6], lane: usize) -> [f64; 2] {
+    let ([i, j, k], across) = &FACES[usize::from(face & 3)];
+    let [p, q, r] = [&fields[*i], &fields[*j], &fields[*k]];
+    let [a, b, c] = [areas[across[0]][lane], areas[across[1]][lane], areas[across[2]][lane]];
+    let weight = a * p[0] + b * q[0] + c * r[0];
+    let depth = a * p[1] + b * q[1] + c * r[1];
+    let value = a * p[2] + b * q[2] + c * r[2];
+    if weight > 0.0 {
+        let part = 1.0 / weight;
+        return [depth * part, value * part];
+    }
+    // Seen edge-on, all areas nothing: any place of the face is as good.
+    [p[1] / p[0], p[2] / p[0]]
+}
+
+/// On which side of each edge the ray of a pixel passes, a bit each, set where the area is less than nothing.
+#[cold]
+#[inline(never)]
+fn exact_sides(corners: &[&Corner; 4], [i, j]: [i32; 2]) -> u64 {
+    let about = corners.map(|c| [c.x - f64::from(i) * c.w, c.y - f64::from(j) * c.w]);
+    let mut sides = 0;
+    for (edge, [a, b]) in EDGES.into_iter().enumerate() {
+        let ([ax, ay], [bx, by]) = (about[a], about[b]);
+        let (aw, bw) = (corners[a].w, corners[b].w);
+        let turned = [[[ax, by], [ay, bx]], [[bw, ay], [aw, by]], [[aw, bx], [bw, ax]]];
+        // In turn: as it is; the ray moved by ε along x; by ε² along y; the corner of the lower number moved along x, with
+        // the ray still moved.
+        let decided = turned.into_iter().map(|[p, q]| compare(p, q)).find(|o| o.is_ne());
+        let negative = match decided {
+            Some(order) => order.is_lt(),
+            None => by < 0.0 || (by == 0.0 && bw > 0.0),
+        };
+        sides |= u64::from(negative) << edge;
+    }
+    sides
+}
+
+/// Exactly, how a·b compares with c·d.
+fn compare([a, b]: [f64; 2], [c, d]: [f64; 2]) -> Ordering {
+    // Far from where products lose digits to underflow.
+    let [a, b, c, d] = [a, b, c, d].map(|v| v * f64::from_bits((1023 + 300) << 52));
+    let (p, q) = (a * b, c * d);
+    // Rounding never turns an order round; products that round alike differ by what they rounded off.
+    let order = |p: f64, q: f64| p.partial_cmp(&q).unwrap_or(Ordering::Equal);
+    order(p, q).then_with(|| order(a.mul_add(b, -p), c.mul_add(d, -q)))
+}

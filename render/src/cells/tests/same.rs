@@ -1,0 +1,255 @@
+//! The same bytes however it is done; early termination within its bound; workers that fail.
+
+use super::*;
+use std::sync::Mutex;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+const SIZE: [u32; 2] = [56, 50];
+
+fn scene(n: usize) -> (CellItem, Camera) {
+    let mesh = lattice(n, 0.3, 3);
+    let mut dice = Dice::new(8);
+    let noise: Vec<f64> = mesh.0.iter().map(|_| dice.next()).collect();
+    let side = n as f64;
+    let camera =
+        looks([side * 1.6, -side, side * 1.3], [side / 2.0; 3], Projection::Perspective { fov_rad: 0.8 });
+    (item(&grid(&mesh, |i, _| noise[i]), varied(0.3)), camera)
+}
+
+/// As dense as bone, so that early termination has something to do.
+fn dense(n: usize) -> (CellItem, Camera) {
+    let (mut item, camera) = scene(n);
+    item.transfer = Arc::new(transfer(&[[0.0, 0.1, 0.3, 0.9, 0.5], [1.0, 0.9, 0.7, 0.1, 0.9]], 0.6));
+    (item, camera)
+}
+
+fn workers(count: usize, engine: Engine) -> Options {
+    Options { workers: Some(count), engine, keep_segments: true, ..Options::default() }
+}
+
+#[test]
+fn any_number_of_workers_and_either_engine_give_the_same_bytes() {
+    let (item, camera) = scene(10);
+    let known = draw(&item, &camera, SIZE, &workers(1, Engine::Threads));
+    assert!(known.image.pixels.iter().filter(|p| p[3] > 0.0).count() > 500, "there is a picture");
+    for engine in [Engine::Threads, Engine::Simulated] {
+        for count in [1, 2, 3, 4, 5, 8] {
+            for (balance, spread) in
+                [(false, Spread::Columns), (true, Spread::Columns), (true, Spread::Blocks)]
+            {
+                let options = Options { spread, balance, ..workers(count, engine) };
+                let picture = draw(&item, &camera, SIZE, &options);
+                assert!(picture.image == known.image, "{engine:?}, {count} workers: another picture");
+                assert!(picture.segments == known.segments, "{engine:?}, {count} workers: other segments");
+                assert_eq!(picture.stats.workers.len(), count, "each is counted");
+                let [found, all] = [&picture.stats.total, &known.stats.total];
+                assert_eq!(found.segments, all.segments, "the same work");
+                assert_eq!(found.clusters, all.clusters, "each cluster once");
+            }
+        }
+    }
+}
+
+#[test]
+fn either_kind_of_instructions_gives_the_same_bytes() {
+    let (item, camera) = scene(6);
+    let wide = draw(&item, &camera, SIZE, &workers(1, Engine::Threads));
+    let plain = draw(&item, &camera, SIZE, &Options { wide: false, ..workers(1, Engine::Threads) });
+    assert!(wide.image == plain.image && wide.segments == plain.segments, "AVX2 and without");
+}
+
+#[test]
+fn any_order_of_cells_and_corners_gives_the_same_bytes() {
+    let (first, camera) = scene(8);
+    let known = draw(&first, &camera, SIZE, &workers(2, Engine::Threads));
+    let mut cells: Vec<Vec<u32>> = (0..first.grid.len()).map(|c| first.grid.cell(c).1.to_vec()).collect();
+    let mut dice = Dice::new(99);
+    for round in 0..3 {
+        for i in (1..cells.len()).rev() {
+            cells.swap(i, (dice.next() * (i + 1) as f64) as usize);
+            // An even permutation keeps the cell as it is.
+            cells[i].rotate_left(1);
+            cells[i].swap(0, 1);
+        }
+        let steps = first.grid.steps().to_vec();
+        let kinds = vec![CellKind::Tetra; cells.len()];
+        let grid = CellGrid::new(first.grid.points().to_vec(), kinds, cells.concat(), steps).expect("a grid");
+        let other = CellItem { grid: Arc::new(grid), ..first.clone() };
+        let picture = draw(&other, &camera, SIZE, &workers(2, Engine::Threads));
+        assert!(picture.image == known.image && picture.segments == known.segments, "round {round}");
+        assert_eq!(picture.stats.faults, known.stats.faults, "none turned round");
+    }
+}
+
+#[test]
+fn leaving_out_what_is_clear_changes_nothing_and_is_counted() {
+    let (mut item, camera) = scene(8);
+    let points: Mesh = (
+        item.grid.points().to_vec(),
+        (0..item.grid.len())
+            .map(|c| {
+                let (_, corners) = item.grid.cell(c);
+                [corners[0], corners[1], corners[2], corners[3]]
+            })
+            .collect(),
+    );
+    item.grid = grid(&points, |_, p| p.x / 8.0);
+    item.transfer = Arc::new(transfer(&[[0.5, 0.9, 0.1, 0.2, 0.0], [1.0, 0.1, 0.5, 0.9, 0.8]], 1.0));
+    let with = draw(&item, &camera, SIZE, &workers(2, Engine::Threads));
+    let without = draw(&item, &camera, SIZE, &Options { skip_clear: false, ..workers(2, Engine::Threads) });
+    let off = with.image.difference(&without.image, [0.0; 3]).expect("same size").max;
+    assert!(off < 0.01, "the same picture: {off}");
+    assert!(with.stats.total.clear > 0, "some cells are clear");
+    assert!(with.stats.total.scanned < without.stats.total.scanned, "and cost nothing");
+    for stats in [&with.stats, &without.stats] {
+        let t = &stats.total;
+        assert_eq!(t.outside + t.clear + t.hidden + t.not_finite + t.scanned, stats.tetrahedra, "each once");
+    }
+}
+
+#[test]
+fn early_termination_stays_within_its_bound_and_saves_work() {
+    let (item, camera) = dense(16);
+    let whole = draw(&item, &camera, SIZE, &workers(2, Engine::Threads));
+    for (threshold, most) in [(0.9, 0.8), (1.0 - 1.0 / 512.0, 0.9)] {
+        for share in [false, true] {
+            for (count, engine) in [(1, Engine::Threads), (2, Engine::Threads), (8, Engine::Simulated)] {
+                let early = Some(Early { threshold, ..Early::default() });
+                let options = Options { early, share, ..workers(count, engine) };
+                let picture = draw(&item, &camera, SIZE, &options);
+                let mut off = 0.0_f64;
+                for (a, b) in picture.image.pixels.iter().zip(&whole.image.pixels) {
+                    for c in 0..4 {
+                        off = off.max(f64::from((a[c] - b[c]).abs()));
+                    }
+                }
+                assert!(off <= 1.0 - threshold + 1e-5, "{threshold}, {count} workers: off by {off}");
+                let [some, all] = [picture.stats.total.scanned, whole.stats.total.scanned].map(|n| n as f64);
+                if count == 1 {
+                    assert!(some < most * all, "{threshold}: {some} of {all} cells scan-converted");
+                    assert!(off > 0.0, "something was left out");
+                }
+                let t = &picture.stats.total;
+                let sum = t.outside + t.clear + t.hidden + t.not_finite + t.scanned;
+                assert_eq!(sum, picture.stats.tetrahedra, "each cell once");
+            }
+        }
+    }
+}
+
+#[test]
+fn work_is_shared_out_evenly_and_termination_is_shared() {
+    let (item, camera) = dense(22);
+    let early = Some(Early::default());
+    let draw = |balance, share, early| {
+        let spread = Spread::Blocks;
+        let options = Options { early, spread, balance, share, ..workers(8, Engine::Simulated) };
+        draw(&item, &camera, [96, 90], &options).stats
+    };
+    let [base, balanced] = [draw(false, false, None), draw(true, false, None)];
+    assert!(balanced.imbalance() < 1.1, "balanced: {}", balanced.imbalance());
+    assert!(balanced.imbalance() <= base.imbalance(), "and no worse than without: {}", base.imbalance());
+    assert!(balanced.total.taken > 0 && base.total.taken == 0, "by taking over clusters");
+    let [alone, shared] = [draw(true, false, early), draw(true, true, early)];
+    assert!(shared.total.scanned < alone.total.scanned, "what others know saves cells");
+    assert!(alone.total.scanned <= base.total.scanned, "so does what one knows oneself");
+    let columns = Options { early, ..workers(8, Engine::Simulated) };
+    let columns = super::draw(&item, &camera, [96, 90], &columns).stats;
+    assert!(
+        columns.total.scanned < shared.total.scanned,
+        "columns of the picture save more than blocks of the grid"
+    );
+    assert!(shared.subscreens > 1, "subscreens of the size of cells: {}", shared.subscreens);
+}
+
+/// A link of channels, as between processes.
+struct Channels {
+    rank: usize,
+    to: Vec<SyncSender<(usize, Vec<u8>)>>,
+    from: Receiver<(usize, Vec<u8>)>,
+    held: Option<(usize, Vec<u8>)>,
+    /// Breaks down after so many messages.
+    lasts: usize,
+}
+
+impl Channels {
+    fn group(count: usize, lasts: usize) -> Vec<Self> {
+        let (to, from): (Vec<_>, Vec<_>) = (0..count).map(|_| sync_channel(1 << 16)).unzip();
+        let link = |(rank, from)| Self {
+            rank,
+            to: to.clone(),
+            from,
+            held: None,
+            lasts: if rank == 1 { lasts } else { usize::MAX },
+        };
+        from.into_iter().enumerate().map(link).collect()
+    }
+}
+
+impl Link for Channels {
+    fn rank(&self) -> usize {
+        self.rank
+    }
+
+    fn size(&self) -> usize {
+        self.to.len()
+    }
+
+    fn send(&mut self, to: usize, message: Vec<u8>) -> Result<(), LinkError> {
+        self.lasts = self.lasts.checked_sub(1).ok_or(LinkError::Lost { rank: self.rank })?;
+        self.to[to].send((self.rank, message)).map_err(|_gone| LinkError::Lost { rank: to })
+    }
+
+    fn poll(&mut self) -> Result<Option<(usize, Vec<u8>)>, LinkError> {
+        Ok(self.held.take().or_else(|| self.from.try_recv().ok()))
+    }
+
+    fn wait(&mut self) -> Result<(), LinkError> {
+        let wait = std::time::Duration::from_secs(2);
+        self.held = Some(self.from.recv_timeout(wait).map_err(|_none| LinkError::Lost { rank: 1 })?);
+        Ok(())
+    }
+}
+
+/// What each worker of a group comes to.
+fn group(count: usize, lasts: usize) -> Vec<Result<Option<CellPicture>, CellsError>> {
+    let (item, camera) = scene(6);
+    let results = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for link in Channels::group(count, lasts) {
+            let (item, camera, results) = (&item, &camera, &results);
+            scope.spawn(move || {
+                let rank = link.rank;
+                let options = Options { keep_segments: true, ..Options::default() };
+                let mut renderer = CellRenderer::new();
+                let result = renderer.render_as(item, camera, SIZE, &options, Breaks::default(), link);
+                results.lock().expect("no panic").push((rank, result));
+            });
+        }
+    });
+    let mut results = results.into_inner().expect("no panic");
+    results.sort_by_key(|r| r.0);
+    results.into_iter().map(|r| r.1).collect()
+}
+
+#[test]
+fn workers_behind_a_link_of_ones_own_give_the_same_bytes() {
+    let (item, camera) = scene(6);
+    let known = draw(&item, &camera, SIZE, &workers(1, Engine::Threads));
+    for count in [1, 2, 3, 6] {
+        let results = group(count, usize::MAX);
+        let first = results[0].as_ref().expect("no error").as_ref().expect("the first has it");
+        assert!(first.image == known.image && first.segments == known.segments, "{count} workers");
+        assert!(results[1..].iter().all(|r| matches!(r, Ok(None))), "the others have nothing");
+    }
+}
+
+#[test]
+fn a_worker_that_is_lost_is_an_error_and_no_hang() {
+    for lasts in [0, 1, 3, 8] {
+        for result in group(4, lasts) {
+            let lost = matches!(result, Err(CellsError::Link(LinkError::Lost { .. })) | Ok(None));
+            assert!(lost, "no picture, but a clear end: {:?}", result.err());
+        }
+    }
+}
