@@ -312,6 +312,8 @@ pub enum BenchName {
     Pareto,
     /// What skipping saves, on data: nothing skipped, a changed transfer function, a moved cut, seven ways to cut.
     Skips,
+    /// Unstructured grids by cell projection: early termination, sharing and balancing, for 1 to 8 workers.
+    Cells,
 }
 
 /// Arguments of `demo`.

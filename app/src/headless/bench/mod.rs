@@ -1,7 +1,7 @@
 //! `bench`: run time beside error, one file a benchmark.
 //!
 //! `frame` draws, `textures` makes textures, `accuracy` refines scenes of known pictures, `pareto` sweeps what a picture
-//! can be made cheaper by, `skips` says what skipping saves; `series` and `play`, of volumes over time, lie beside what
+//! can be made cheaper by, `skips` says what skipping saves, `cells` draws unstructured grids; `series` and `play`, of volumes over time, lie beside what
 //! they measure.
 //!
 //! Each result is one JSON object a line (`--json`) or a line of a table. Times are the median of
@@ -9,6 +9,7 @@
 //! decides; fewer where a measurement takes long.
 
 mod accuracy;
+mod cells;
 mod frame;
 mod painter;
 mod pareto;
@@ -64,6 +65,10 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
         BenchName::Skips => {
             skips::run(&data(args)?, &mut bench)?;
             Vec::new()
+        }
+        BenchName::Cells => {
+            cells::run(args.data.as_deref(), &mut bench)?;
+            vec![("cells.svg", cells::chart(&bench.rows))]
         }
         BenchName::Pareto => {
             let case = args.data.as_deref().filter(|path| input::is_case(path));
