@@ -8,7 +8,7 @@ use crate::gather::{Caches, Counts, Gathered, Limits};
 use crate::gpu::{Gpu, GpuError, read_texture};
 use crate::image::FloatImage;
 use crate::passes::present::Present;
-use crate::passes::slabs::{Inputs, SLOTS, Slabs, Spacing, Stack, upload};
+use crate::passes::slabs::{Inputs, Slabs, Spacing, Stack, upload};
 use crate::passes::surfaces::{LAYER_BYTES, Surfaces};
 use crate::scene::Scene;
 use crate::target::{Target, buffer_entry};
@@ -270,13 +270,8 @@ impl Renderer {
         let nothing = Spacing { near_mm: 0.0, step_mm, steps: STEPS, slabs: 1 };
         let mut whole =
             bind_frame(&gpu, &self.frame_layout, &frame_data(scene, &view, &nothing, self.skips.finished));
-        if let Some(mut spacing) = spacing {
-            let mut stack = Stack::new(&gathered.members, &view, &spacing);
-            if stack.most_overlapping > SLOTS {
-                // A slab's optical depths are added up there by several draws, which take it as one sub-step.
-                spacing = spacing.single_steps();
-                stack = Stack::new(&gathered.members, &view, &spacing);
-            }
+        if let Some(spacing) = spacing {
+            let stack = Stack::new(&gathered.members, &view, &spacing);
             let frame = frame_data(scene, &view, &spacing, self.skips.finished);
             whole = bind_frame(&gpu, &self.frame_layout, &frame);
             let (fragments, planes, rounds) = gathered.to_gpu(&view, &spacing);

@@ -335,6 +335,7 @@ impl Slabs {
             ("GAPS", variant.gaps),
             ("SURFACES", variant.surfaces),
             ("LAYERS", variant.layers),
+            ("SINGLE", variant.stage != Stage::Whole),
         ];
         constants.extend(flags.map(|(name, on)| (name, f64::from(u8::from(on)))));
         let options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };

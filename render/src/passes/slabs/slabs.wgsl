@@ -104,6 +104,8 @@ override GAPS: bool = false;
 // Whether surfaces may lie in the slab, and whether any of the picture's is translucent.
 override SURFACES: bool = false;
 override LAYERS: bool = false;
+// Whether a slab is one sub-step: where what is in it is added up by several draws.
+override SINGLE: bool = false;
 
 const KIND_NONE: u32 = 0u;
 const KIND_SCALAR: u32 = 1u;
@@ -125,7 +127,7 @@ fn vs_main(
     @location(1) slab: u32,
     @location(2) component: u32,
 ) -> VertexOut {
-    let zeta = f32(slab * frame.steps) * frame.step_mm;
+    let zeta = f32(slab * select(frame.steps, 1u, SINGLE)) * frame.step_mm;
     return VertexOut(vec4<f32>(ndc, depth_of(zeta), 1.0), slab, component);
 }
 
@@ -587,15 +589,15 @@ fn fs_main(in: VertexOut) -> @location(0) vec4<f32> {
     return vec4<f32>(met.color, met.alpha);
 }
 
-// Where more fragments meet than there are slots, a slab is one sub-step: what each holds of optical depth x colour
-// and optical depth is added up by several draws.
+// Where more fragments meet than there are slots, sub-steps are drawn one by one: what each fragment holds there of optical
+// depth x colour and optical depth is added up by several draws.
 @fragment
 fn fs_sum(in: VertexOut) -> @location(0) vec4<f32> {
     let ndc = ndc_of(vec2<u32>(in.position.xy));
     let e = vec3<f32>(1.0, ndc);
     let ray = vec4<f32>(ray_direction(ndc), mm_per_zeta(ndc));
-    let z0 = f32(in.slab * frame.steps) * frame.step_mm;
-    let z1 = f32((in.slab + 1u) * frame.steps) * frame.step_mm;
+    let z0 = f32(in.slab) * frame.step_mm;
+    let z1 = f32(in.slab + 1u) * frame.step_mm;
     let ids = components[in.component].fragments;
     var sum = vec4<f32>(0.0);
     if KIND_0 != KIND_NONE {
@@ -625,8 +627,8 @@ fn fs_sum(in: VertexOut) -> @location(0) vec4<f32> {
 @fragment
 fn fs_mix(in: VertexOut) -> @location(0) vec4<f32> {
     let pixel = vec2<u32>(in.position.xy);
-    let z0 = f32(in.slab * frame.steps) * frame.step_mm;
-    let z1 = f32((in.slab + 1u) * frame.steps) * frame.step_mm;
+    let z0 = f32(in.slab) * frame.step_mm;
+    let z1 = f32(in.slab + 1u) * frame.step_mm;
     let sum = textureLoad(optical, pixel, 0) / (z1 - z0);
     var layer = NO_LAYER;
     var wall = 3.4e38;

@@ -86,11 +86,6 @@ impl Spacing {
         Some(Self { near_mm: first * slab_mm, step_mm, steps, slabs: slabs as u32 })
     }
 
-    /// The same stack with one sub-step a slab.
-    pub(crate) fn single_steps(self) -> Self {
-        Self { steps: 1, slabs: self.slabs * self.steps, ..self }
-    }
-
     pub(crate) fn slab_mm(&self) -> f64 {
         self.step_mm * f64::from(self.steps)
     }
@@ -151,31 +146,34 @@ impl Stack {
             stack.tiles_skipped += sets.looked - sets.shown;
             stack.occupied += u32::from(sets.shown > 0);
             for (set, pieces) in sets.runs() {
-                stack.add(slab, members, &set, &pieces);
+                stack.add([slab, spacing.steps], members, &set, &pieces);
             }
         }
         stack
     }
 
-    fn add(&mut self, slab: u32, members: &[Member], set: &[usize], pieces: &[Rectangle]) {
+    fn add(&mut self, [slab, steps]: [u32; 2], members: &[Member], set: &[usize], pieces: &[Rectangle]) {
         let surfaces = set.iter().any(|&m| members[m].volume.is_none());
         let mut volumes: Vec<_> = set.iter().filter_map(|&m| members[m].volume).collect();
         self.most_overlapping = self.most_overlapping.max(volumes.len());
         // By kind, so that fewer different shaders are made.
         volumes.sort_by_key(|&(fragment, kind, _)| (kind, fragment));
         if volumes.len() <= SLOTS {
-            self.draw(slab, Stage::Whole, &volumes, surfaces, pieces);
+            self.draw([slab; 2], Stage::Whole, &volumes, surfaces, pieces);
             return;
         }
-        for chunk in volumes.chunks(SLOTS) {
-            self.draw(slab, Stage::Sum, chunk, false, pieces);
+        for step in slab * steps..(slab + 1) * steps {
+            for chunk in volumes.chunks(SLOTS) {
+                self.draw([slab, step], Stage::Sum, chunk, false, pieces);
+            }
+            self.draw([slab, step], Stage::Mix, &[], surfaces, pieces);
         }
-        self.draw(slab, Stage::Mix, &[], surfaces, pieces);
     }
 
+    /// Draws a slab, or a sub-step of one where what is in it is added up.
     fn draw(
         &mut self,
-        slab: u32,
+        [slab, drawn]: [u32; 2],
         stage: Stage,
         volumes: &[(u32, Kind, usize)],
         surfaces: bool,
@@ -193,7 +191,7 @@ impl Stack {
             self.components.len() - 1
         }) as u32;
         let first = self.vertices.len() as u32;
-        let corner = |p: [f64; 2]| Vertex { ndc: p.map(|c| c as f32), slab, component };
+        let corner = |p: [f64; 2]| Vertex { ndc: p.map(|c| c as f32), slab: drawn, component };
         for [x, y] in pieces {
             let corners = [[0, 0], [1, 0], [1, 1], [0, 0], [1, 1], [0, 1]];
             self.vertices.extend(corners.map(|[i, j]: [usize; 2]| corner([x[i], y[j]])));
