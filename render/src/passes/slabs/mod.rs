@@ -1,6 +1,6 @@
 //! Volumes by proxy slices: one stack of slabs, perpendicular to the view, for all fragments and meshes.
 //!
-//! [`stack`] decides on the CPU, in `f64`, which polygons to draw; `slabs.wgsl` integrates the slab in each
+//! [`stack`] decides on the CPU, in `f64`, which tiles of which slabs to draw; `slabs.wgsl` integrates the slab in each
 //! pixel; `saturate.wgsl` now and then marks finished pixels in the depth buffer.
 //!
 //! Source: Doi, section 3 (view-aligned slices of each part's own texture, mixed with polygons by depth);

@@ -17,7 +17,7 @@ pub(crate) struct Member {
     pub(crate) shown: Option<Shown>,
 }
 
-/// One corner of a proxy polygon.
+/// One corner of a run of tiles; `slab` is a sub-step where those are drawn one by one.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct Vertex {
