@@ -72,8 +72,7 @@ struct Bricked {
 
 impl Bricked {
     fn is_of(&self, item: &VolumeItem) -> bool {
-        Arc::ptr_eq(&self.grid, &item.grid)
-            && (Arc::ptr_eq(&self.transfer, &item.transfer) || self.transfer == item.transfer)
+        Arc::ptr_eq(&self.grid, &item.grid) && Transfer::same(&self.transfer, &item.transfer)
     }
 }
 

@@ -39,6 +39,7 @@ pub mod renderer;
 pub mod scene;
 pub mod section;
 pub mod shader;
+mod simd;
 mod target;
 mod texture;
 mod transfer;

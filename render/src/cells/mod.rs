@@ -60,6 +60,7 @@ use thiserror::Error;
 
 use crate::image::FloatImage;
 use crate::scene::{Camera, CameraError};
+use crate::simd::has_wide;
 use crate::view::View;
 use crate::volume::cells::{CellGrid, Field, Place};
 use crate::volume::{Affine, Transfer};
@@ -84,6 +85,16 @@ pub enum Part {
     Component(usize),
     /// The length of the tuple as a vector.
     Magnitude,
+}
+
+impl Part {
+    /// This of a tuple of a field; both must lie inside.
+    pub fn of(self, field: &Field, tuple: usize) -> f64 {
+        match self {
+            Self::Component(c) => field.value(tuple, c),
+            Self::Magnitude => field.magnitude(tuple),
+        }
+    }
 }
 
 /// A scalar of a grid.
@@ -358,7 +369,7 @@ impl CellRenderer {
         let Kept { clusters, scalars, .. } = &mut self.kept[index];
         let known = scalars.take().filter(|(s, scalar, _)| (*s, scalar) == (item.step, &item.scalar));
         let (_, _, scalars) = scalars.insert(known.unwrap_or_else(|| {
-            let values = Scalars::new(clusters, item.scalar.place, |n| value(field, item.scalar.part, n));
+            let values = Scalars::new(clusters, item.scalar.place, |n| item.scalar.part.of(field, n));
             (item.step, item.scalar.clone(), values)
         }));
         let prepare_ms = begin.elapsed().as_secs_f64() * 1e3;
@@ -375,26 +386,6 @@ impl CellRenderer {
             begin: Instant::now(),
         })
     }
-}
-
-fn value(field: &Field, part: Part, tuple: usize) -> f64 {
-    match part {
-        Part::Component(c) => field.value(tuple, c),
-        Part::Magnitude => field.magnitude(tuple),
-    }
-}
-
-/// Whether the machine has AVX2 and what goes with it.
-fn has_wide() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    {
-        is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("lzcnt")
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    false
 }
 
 /// What a picture is drawn from.

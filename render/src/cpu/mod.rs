@@ -43,6 +43,7 @@ use thiserror::Error;
 use crate::image::FloatImage;
 use crate::renderer::{Quality, Stats};
 use crate::scene::{CameraError, Scene, TextureFormat, VolumeItem, VolumeMode};
+use crate::simd::has_wide;
 use crate::view::View;
 use crate::volume::{Grid, Point, Transfer};
 use field::{Field, Occupancy};
@@ -113,19 +114,6 @@ pub enum Instructions {
     Best,
     /// What every machine of the architecture has.
     Plain,
-}
-
-/// Whether the machine has AVX2 and what goes with it.
-fn has_wide() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    {
-        is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("lzcnt")
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    false
 }
 
 /// Pixels that may go at once, across and down.
@@ -267,7 +255,7 @@ impl CpuRenderer {
     fn ready(&mut self, scene: &Scene, stats: &mut Stats) -> Vec<[usize; 2]> {
         let is_same = |(transfer, mode, ..): &(Arc<Transfer>, VolumeMode, Occupancy, Table),
                        item: &VolumeItem| {
-            *mode == item.mode && (Arc::ptr_eq(transfer, &item.transfer) || *transfer == item.transfer)
+            *mode == item.mode && Transfer::same(transfer, &item.transfer)
         };
         self.kept.retain_mut(|kept| {
             let shown = |grid: &Arc<Grid>| Arc::ptr_eq(grid, kept.field.grid());

@@ -25,7 +25,7 @@ impl TextureKey {
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         let transfer = match (&self.transfer, &other.transfer) {
             (None, None) => true,
-            (Some(a), Some(b)) => Arc::ptr_eq(a, b) || a == b,
+            (Some(a), Some(b)) => Transfer::same(a, b),
             _ => false,
         };
         transfer

@@ -1,5 +1,7 @@
 //! From a value to colour and opacity.
 
+use std::sync::Arc;
+
 use thiserror::Error;
 
 /// One point of a transfer function. Components are display values in `[0, 1]`.
@@ -71,6 +73,11 @@ impl Transfer {
             }
         }
         Ok(Self { points, unit_mm })
+    }
+
+    /// Whether two are equal, at once where they are one.
+    pub fn same(a: &Arc<Self>, b: &Arc<Self>) -> bool {
+        Arc::ptr_eq(a, b) || a == b
     }
 
     /// The control points, by rising value.

@@ -138,12 +138,8 @@ fn error(item: &CellItem, camera: &Camera, picture: &CellPicture) -> Result<f64,
     let Some(field) = item.grid.steps()[item.step].field(item.scalar.place, &item.scalar.name) else {
         return Ok(f64::NAN);
     };
-    let values: Vec<f64> = match item.scalar.part {
-        Part::Component(_) => field.values().iter().collect(),
-        Part::Magnitude => {
-            (0..field.values().len() / field.components()).map(|t| field.magnitude(t)).collect()
-        }
-    };
+    let tuples = field.values().len() / field.components().max(1);
+    let values: Vec<f64> = (0..tuples).map(|tuple| item.scalar.part.of(field, tuple)).collect();
     let (pose, place, transfer) = (item.pose, item.scalar.place, &*item.transfer);
     let field = CellField { grid: &item.grid, pose, place, values: &values, transfer };
     let known = draw_pixels(&field, camera, size, &pixels)?;

@@ -140,7 +140,7 @@ pub(super) fn off(
     let step = &item.grid.steps()[item.step];
     let field = step.field(item.scalar.place, &item.scalar.name).expect("a field");
     let tuples = field.values().len() / field.components();
-    let values: Vec<f64> = (0..tuples).map(|n| value(field, item.scalar.part, n)).collect();
+    let values: Vec<f64> = (0..tuples).map(|n| item.scalar.part.of(field, n)).collect();
     let known = CellField {
         grid: &item.grid,
         pose: item.pose,

@@ -57,9 +57,7 @@ impl TableCache {
 
     /// The table of a function over the values between `range[0]` and `range[1]`.
     pub(crate) fn get(&mut self, transfer: &Arc<Transfer>, range: [f64; 2]) -> Arc<GpuTable> {
-        let same = |k: &&mut Kept| {
-            k.range == range && (Arc::ptr_eq(&k.transfer, transfer) || k.transfer == *transfer)
-        };
+        let same = |k: &&mut Kept| k.range == range && Transfer::same(&k.transfer, transfer);
         if let Some(found) = self.kept.iter_mut().find(same) {
             found.used = true;
             return Arc::clone(&found.table);
