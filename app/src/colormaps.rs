@@ -17,6 +17,20 @@ pub struct Colormap {
 /// All, the default first.
 pub const COLORMAPS: [Colormap; 5] = [
     Colormap {
+        name: "Cool to warm",
+        colors: &[
+            [59, 76, 192],
+            [98, 130, 234],
+            [141, 176, 254],
+            [184, 208, 249],
+            [221, 221, 221],
+            [245, 196, 173],
+            [244, 154, 123],
+            [222, 96, 77],
+            [180, 4, 38],
+        ],
+    },
+    Colormap {
         name: "Viridis",
         colors: &[
             [68, 1, 84],
@@ -45,20 +59,6 @@ pub const COLORMAPS: [Colormap; 5] = [
         ],
     },
     Colormap {
-        name: "Cool to warm",
-        colors: &[
-            [59, 76, 192],
-            [98, 130, 234],
-            [141, 176, 254],
-            [184, 208, 249],
-            [221, 221, 221],
-            [245, 196, 173],
-            [244, 154, 123],
-            [222, 96, 77],
-            [180, 4, 38],
-        ],
-    },
-    Colormap {
         name: "Rainbow",
         colors: &[[0, 0, 255], [0, 255, 255], [0, 255, 0], [255, 255, 0], [255, 0, 0]],
     },
@@ -66,7 +66,7 @@ pub const COLORMAPS: [Colormap; 5] = [
 ];
 
 /// Opacity at the least and the greatest value, of a hundredth of the grid's diagonal: what is high is seen through what is low.
-pub const OPACITY: [f64; 2] = [0.02, 0.3];
+pub const OPACITY: [f64; 2] = [0.06, 0.5];
 
 impl Colormap {
     /// These colours over a range of values, with an opacity of `unit_mm` that rises evenly between two. A range without
