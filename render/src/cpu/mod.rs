@@ -133,6 +133,9 @@ pub enum Instructions {
     Plain,
 }
 
+/// Steps between two walls of cells where cells overlap, for one step a voxel.
+const STEPS_IN_CELLS: f64 = 8.0;
+
 /// Bands at most that grids are scan-converted for at once.
 const STRIP: usize = 8;
 
@@ -195,7 +198,7 @@ impl CpuRenderer {
     /// `progress` is told, from any thread, how much of the picture is done and of how much; as soon as it answers `false`
     /// the drawing stops.
     ///
-    /// An unstructured grid that is alone in the scene is drawn by [`CellRenderer`], in drafts with early termination at what
+    /// An unstructured grid that is alone in the scene and of which no cells overlap is drawn by [`CellRenderer`], in drafts with early termination at what
     /// a draft may leave out; such drafts depend on the threads' timing, within that.
     ///
     /// # Errors
@@ -208,7 +211,9 @@ impl CpuRenderer {
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> Result<(FloatImage, Stats), CpuError> {
         if let ([], [], [grid]) = (&scene.volumes[..], &scene.meshes[..], &scene.grids[..]) {
-            return self.grid_alone(grid, scene, size, quality, progress);
+            if let Some(drawn) = self.grid_alone(grid, scene, size, quality, progress)? {
+                return Ok(drawn);
+            }
         }
         let begin = Instant::now();
         let [width, height] = size;
@@ -232,7 +237,8 @@ impl CpuRenderer {
         let voxel_mm = placed.pieces.iter().map(|p| p.voxel_mm).fold(f64::INFINITY, f64::min);
         let voxel_mm = if voxel_mm.is_finite() { voxel_mm } else { 1.0 };
         stats.step_mm = voxel_mm * quality.voxels();
-        let manner = Manner { step_mm: stats.step_mm as f32, dark: self.dark(quality) };
+        let steps_in_cells = (STEPS_IN_CELLS / quality.voxels()).ceil() as u32;
+        let manner = Manner { step_mm: stats.step_mm as f32, steps_in_cells, dark: self.dark(quality) };
         let tiles = (width as usize).div_ceil(TILE) * (height as usize).div_ceil(TILE);
         for depths in &depths {
             let shown = depths.shown;
@@ -288,7 +294,7 @@ impl CpuRenderer {
         Ok((FloatImage { width, height, pixels }, stats))
     }
 
-    /// A scene of one grid and nothing else.
+    /// A scene of one grid and nothing else; nothing where cells of it overlap, whose colours mix along their depth.
     fn grid_alone(
         &mut self,
         grid: &CellItem,
@@ -296,7 +302,7 @@ impl CpuRenderer {
         size: [u32; 2],
         quality: Quality,
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
-    ) -> Result<(FloatImage, Stats), CpuError> {
+    ) -> Result<Option<(FloatImage, Stats)>, CpuError> {
         let dark = f64::from(self.dark(quality));
         let ends_early = quality == Quality::Draft && dark > 0.0;
         let options = cells::Options {
@@ -307,6 +313,9 @@ impl CpuRenderer {
         };
         let drawn = self.cells.render(grid, &scene.camera, size, &options, Breaks::default(), progress)?;
         let cells = &drawn.stats;
+        if cells.total.overlaps + cells.total.overlapping_pixels > 0 {
+            return Ok(None);
+        }
         let stats = Stats {
             frame_ms: cells.prepare_ms + cells.frame_ms,
             prepare_ms: cells.prepare_ms,
@@ -314,7 +323,7 @@ impl CpuRenderer {
             tetrahedra_scanned: cells.total.scanned,
             ..Stats::default()
         };
-        Ok((drawn.image, stats))
+        Ok(Some((drawn.image, stats)))
     }
 
     /// What may be left out behind a pixel falls with the error of the steps, which goes with their square.
