@@ -10,7 +10,7 @@ use std::sync::Arc;
 use super::CellsError;
 use super::clusters::{Clusters, Scalars};
 use super::lens::Lens;
-use super::project::{Breaks, Frame, Projector};
+use super::project::{Breaks, Frame, Gathered, Projector};
 use super::scan::{Raw, Rect};
 use super::stats::Counts;
 use super::table::{Place, Table};
@@ -67,10 +67,15 @@ impl Placed {
     }
 }
 
-/// What the rays of some rows have of a grid; kept from strip to strip.
+/// Pixels that a block is wide: what the rays of one have must be sorted while it is at hand.
+const BLOCK: usize = 64;
+
+/// What the rays of some rows have of a grid, in blocks side by side; kept from strip to strip.
 #[derive(Debug, Default)]
 pub(crate) struct Strip {
     projector: Projector,
+    blocks: Vec<Gathered>,
+    width: usize,
     /// Work since it was made.
     pub(crate) counts: Counts,
 }
@@ -80,17 +85,26 @@ impl Strip {
     pub(crate) fn fill(&mut self, placed: &Placed, rows: Range<usize>) {
         let [width, height] = placed.size.map(|n| i32::try_from(n).unwrap_or(i32::MAX));
         let row = |y: usize| i32::try_from(y).unwrap_or(height).min(height);
-        let rect = Rect { low: [0, row(rows.start)], high: [width, row(rows.end)] };
-        let near = placed.reaches.iter().enumerate().filter(|(_, reach)| !reach.meet(&rect).is_empty());
-        let clusters = near.map(|(cluster, _)| cluster);
-        self.projector.gather(&placed.frame(), &rect, clusters, &mut self.counts);
+        self.width = placed.size[0] as usize;
+        self.blocks.resize_with(self.width.div_ceil(BLOCK), Gathered::default);
+        let frame = placed.frame();
+        for (block, left) in self.blocks.iter_mut().zip((0..width).step_by(BLOCK)) {
+            let right = left.saturating_add(BLOCK as i32).min(width);
+            let rect = Rect { low: [left, row(rows.start)], high: [right, row(rows.end)] };
+            let near = placed.reaches.iter().enumerate().filter(|(_, reach)| !reach.meet(&rect).is_empty());
+            let clusters = near.map(|(cluster, _)| cluster);
+            self.projector.gather(&frame, &rect, clusters, block, &mut self.counts);
+        }
     }
 
     /// What the ray of a pixel has of the grid; pixels count from the first row, row by row. `near_mm` is the depth that
     /// zeta counts from.
     #[inline(always)]
     pub(crate) fn pixel<'a>(&'a self, placed: &'a Placed, pixel: usize, near_mm: f64) -> Spans<'a> {
-        Spans { list: self.projector.gathered(pixel), table: &placed.table, near_mm }
+        let (x, y) = (pixel % self.width, pixel / self.width);
+        let block = x / BLOCK;
+        let wide = BLOCK.min(self.width - block * BLOCK);
+        Spans { list: self.blocks[block].pixel(y * wide + x % BLOCK), table: &placed.table, near_mm }
     }
 }
 
@@ -118,7 +132,7 @@ impl<'a> Spans<'a> {
     }
 
     pub(crate) fn walker(self) -> Walker<'a> {
-        Walker { spans: self, next: 0, open: Vec::new() }
+        Walker { spans: self, next: 0, open: Vec::new(), place: *self.table.start() }
     }
 }
 
@@ -140,13 +154,8 @@ impl Open {
             let part = ((zeta - self.front) / (self.back - self.front)).clamp(0.0, 1.0);
             self.values[0] + (self.values[1] - self.values[0]) * part
         };
-        let [a, b] = [at(from), at(to)];
-        let begin = if a == Table::position_of(&self.place) {
-            self.place
-        } else {
-            table.find(a, Table::piece(&self.place))
-        };
-        let end = if a == b { begin } else { table.find(b, Table::piece(&begin)) };
+        let begin = table.at(at(from), &self.place);
+        let end = table.at(at(to), &begin);
         self.place = end;
         [begin, end]
     }
@@ -158,16 +167,48 @@ pub(crate) struct Walker<'a> {
     spans: Spans<'a>,
     next: usize,
     open: Vec<Open>,
+    /// The place last looked up in a cell that is left.
+    place: Place,
 }
 
 impl Walker<'_> {
+    /// Passes cells that lie whole and alone between two zetas, the first of which is where the last call ended, as long as
+    /// `each` goes on from what is seen of each; where it stops.
+    #[inline(always)]
+    pub(crate) fn run(
+        &mut self,
+        [from, to]: [f32; 2],
+        mm_per_zeta: f32,
+        mut each: impl FnMut([f32; 4]) -> bool,
+    ) -> f32 {
+        let Spans { list, table, .. } = self.spans;
+        let mut at = from;
+        while let (true, Some(raw)) = (self.open.is_empty(), list.get(self.next)) {
+            let back = self.spans.zeta(raw.back);
+            let overlaps = list.get(self.next + 1).is_some_and(|next| next.front < raw.back);
+            if overlaps || back > to || self.spans.zeta(raw.front) < at {
+                break;
+            }
+            let [a, b] = raw.values;
+            let begin = table.at(a, &self.place);
+            let end = table.at(b, &begin);
+            let seen = table.segment(&begin, &end, (raw.back - raw.front) as f32 * mm_per_zeta);
+            (self.place, at) = (end, back);
+            self.next += 1;
+            if !each(seen) {
+                break;
+            }
+        }
+        at
+    }
+
     /// On to a zeta, which does not fall.
     pub(crate) fn reach(&mut self, zeta: f32) {
-        let mut place = *self.spans.table.start();
+        let place = &mut self.place;
         self.open.retain(|open| {
             let stays = open.back > zeta;
             if !stays {
-                place = open.place;
+                *place = open.place;
             }
             stays
         });
@@ -178,7 +219,7 @@ impl Walker<'_> {
             }
             self.next += 1;
             if back > zeta {
-                self.open.push(Open { front, back, values: raw.values, place });
+                self.open.push(Open { front, back, values: raw.values, place: self.place });
             }
         }
     }

@@ -144,20 +144,20 @@ pub(super) fn integrate(
     let mut last = *table.start();
     for raw in raws {
         let [a, b] = raw.values;
-        let mut from = if a == Table::position_of(&last) { last } else { table.find(a, Table::piece(&last)) };
+        let mut from = table.at(a, &last);
         let mut front = raw.front;
         if !stops.is_empty() {
             let mut stop = stops.after(front);
             while stop < raw.back {
                 let part = (stop - raw.front) / (raw.back - raw.front);
-                let to = table.find(a + (b - a) * part as f32, Table::piece(&from));
+                let to = table.at(a + (b - a) * part as f32, &from);
                 let mm = length(stop - front, stretch);
                 into.push(Segment { front, back: stop, rgba: table.segment(&from, &to, mm) });
                 (front, from) = (stop, to);
                 stop = stops.after(front);
             }
         }
-        let to = if a == b { from } else { table.find(b, Table::piece(&from)) };
+        let to = table.at(b, &from);
         let mm = length(raw.back - front, stretch);
         into.push(Segment { front, back: raw.back, rgba: table.segment(&from, &to, mm) });
         last = to;

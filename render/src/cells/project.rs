@@ -87,6 +87,23 @@ struct Shown {
     reach: Rect,
 }
 
+/// What the rays of a rectangle have of a grid.
+#[derive(Debug, Default)]
+pub(super) struct Gathered {
+    /// Where each pixel's end, row by row.
+    ends: Vec<u32>,
+    raws: Vec<Raw>,
+}
+
+impl Gathered {
+    /// What the ray of a pixel has, nearest first.
+    #[inline(always)]
+    pub(super) fn pixel(&self, pixel: usize) -> &[Raw] {
+        let from = if pixel == 0 { 0 } else { self.ends[pixel - 1] };
+        &self.raws[from as usize..self.ends[pixel] as usize]
+    }
+}
+
 /// What is kept from cluster to cluster.
 #[derive(Debug, Default)]
 pub(super) struct Projector {
@@ -136,12 +153,13 @@ impl Projector {
         }
     }
 
-    /// Finds what the rays of a rectangle have of clusters, nearest first for each; see [`Projector::gathered`].
+    /// Finds what the rays of a rectangle have of clusters, nearest first for each.
     pub(super) fn gather(
         &mut self,
         frame: &Frame<'_>,
         rect: &Rect,
         clusters: impl Iterator<Item = usize>,
+        gathered: &mut Gathered,
         counts: &mut Counts,
     ) {
         self.counts.clear();
@@ -178,13 +196,8 @@ impl Projector {
             sort(&mut self.ordered[from..to as usize]);
             from = to as usize;
         }
-    }
-
-    /// What the ray of a pixel of the rectangle that was gathered for has, nearest first.
-    #[inline(always)]
-    pub(super) fn gathered(&self, pixel: usize) -> &[Raw] {
-        let from = if pixel == 0 { 0 } else { self.counts[pixel - 1] };
-        &self.ordered[from as usize..self.counts[pixel] as usize]
+        std::mem::swap(&mut self.counts, &mut gathered.ends);
+        std::mem::swap(&mut self.ordered, &mut gathered.raws);
     }
 
     #[inline(always)]

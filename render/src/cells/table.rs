@@ -229,19 +229,15 @@ impl Table {
         Place { position, piece, sum: self.sum(p, position), varied: p.varied + ahead }
     }
 
+    /// The place of a position that may be, or is near, another.
+    #[inline(always)]
+    pub(super) fn at(&self, position: f32, near: &Place) -> Place {
+        if position == near.position { *near } else { self.find(position, near.piece) }
+    }
+
     /// A place to begin a search with.
     pub(super) fn start(&self) -> &Place {
         &self.start
-    }
-
-    #[inline(always)]
-    pub(super) fn piece(place: &Place) -> usize {
-        place.piece
-    }
-
-    #[inline(always)]
-    pub(super) fn position_of(place: &Place) -> f32 {
-        place.position
     }
 
     /// Colour, premultiplied, and opacity of `mm` along which the scalar runs from one place to another.

@@ -269,6 +269,15 @@ fn march_many(
 ) {
     let mut at = from;
     loop {
+        if let ([], [grid]) = (&walkers, &mut *cells) {
+            at = grid.run([at, to], ray.mm_per_zeta, |seen| {
+                light.layer(seen);
+                light.through >= manner.dark
+            });
+            if light.through < manner.dark {
+                return;
+            }
+        }
         let mut end = walkers.iter().map(|(_, w)| w.next_bend(at)).fold(to, f32::min);
         for grid in cells.iter_mut() {
             grid.reach(at);
