@@ -15,8 +15,19 @@ pub enum LinkError {
         /// Which.
         rank: usize,
     },
+    /// Another worker can do no more, and has said why.
+    #[error("worker {rank} cannot go on: {fault}")]
+    Failed {
+        /// Which.
+        rank: usize,
+        /// What it said.
+        fault: String,
+    },
+    /// The first worker has given the picture up.
+    #[error("the picture was given up by the first worker")]
+    Stopped,
     /// A message makes no sense.
-    #[error("worker {rank} sent a message that cannot be read")]
+    #[error("worker {rank} sent a message that cannot be read; every worker must run the same program")]
     Message {
         /// From which.
         rank: usize,
