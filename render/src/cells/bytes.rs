@@ -143,7 +143,12 @@ impl Reader<'_> {
     }
 
     /// So many, each of so many bytes, which must be there.
-    pub(super) fn some<T>(&mut self, count: u32, bytes: usize, read: impl Fn(&mut Self) -> Option<T>) -> Option<Vec<T>> {
+    pub(super) fn some<T>(
+        &mut self,
+        count: u32,
+        bytes: usize,
+        read: impl Fn(&mut Self) -> Option<T>,
+    ) -> Option<Vec<T>> {
         if (count as usize).checked_mul(bytes)? > self.0.len() {
             return None;
         }

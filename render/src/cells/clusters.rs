@@ -268,7 +268,8 @@ impl Scalars {
             Place::Cells => &clusters.cells[..],
         };
         let count = clusters.len();
-        let mut scalars = Self { place, values: Vec::with_capacity(count), ranges: Vec::with_capacity(count) };
+        let mut scalars =
+            Self { place, values: Vec::with_capacity(count), ranges: Vec::with_capacity(count) };
         for outline in &clusters.outlines {
             let (mine, others) = rest.split_at(scalars.needed(outline));
             rest = others;

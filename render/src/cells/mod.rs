@@ -31,8 +31,8 @@ mod clusters;
 mod early;
 mod engine;
 mod fold;
-mod lens;
 mod group;
+mod lens;
 mod link;
 mod lists;
 #[cfg(feature = "mpi")]

@@ -209,10 +209,8 @@ impl Sent {
             0 => (bytes, &[][..]),
             whole => (&bytes[whole * PIECE..], &bytes[..whole * PIECE]),
         };
-        let mut pieces: Vec<_> = more
-            .chunks(PIECE)
-            .map(|piece| to.immediate_send_with_tag(StaticScope, piece, MORE))
-            .collect();
+        let mut pieces: Vec<_> =
+            more.chunks(PIECE).map(|piece| to.immediate_send_with_tag(StaticScope, piece, MORE)).collect();
         pieces.push(to.immediate_send_with_tag(StaticScope, last, LAST));
         Self { pieces, message }
     }

@@ -101,9 +101,11 @@ impl Drawing {
         let out = out.word(self.number).word(self.size[0]).word(self.size[1]);
         let out = self.lens.to_list().into_iter().fold(out, Writer::real);
         let out = out.real(self.transfer.unit_mm()).word(self.transfer.points().len() as u32);
-        let out = self.transfer.points().iter().fold(out, |out, point| {
-            point.rgba.into_iter().fold(out.real(point.value), Writer::real)
-        });
+        let out = self
+            .transfer
+            .points()
+            .iter()
+            .fold(out, |out, point| point.rgba.into_iter().fold(out.real(point.value), Writer::real));
         let Manner { early, side, share, balance, keep } = self.manner;
         let out = out.long(side as u64).flag(share).flag(balance).flag(keep);
         let out = out.flag(self.spread == Spread::Blocks).flag(self.skip_clear).flag(self.wide);

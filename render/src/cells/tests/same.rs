@@ -247,7 +247,9 @@ fn group<T: Send>(
         let mut links = Channels::group(count, lasts).into_iter();
         let link = links.next().expect("the first");
         let others: Vec<_> = links
-            .map(|link| scope.spawn(move || Group::join(link).map(|group| assert!(group.is_none(), "serves"))))
+            .map(|link| {
+                scope.spawn(move || Group::join(link).map(|group| assert!(group.is_none(), "serves")))
+            })
             .collect();
         let mut group = Group::join(link).expect("no error").expect("the first");
         let result = first(&mut group);
@@ -277,8 +279,7 @@ fn processes_that_have_only_their_part_give_the_same_bytes() {
     for count in [1, 2, 3, 4, 6, 8] {
         for (spread, balance) in [(Spread::Columns, true), (Spread::Blocks, true), (Spread::Blocks, false)] {
             let options = Options { spread, balance, ..keeping() };
-            let (picture, others) =
-                group(count, usize::MAX, |group| drawn(group, &item, &camera, &options));
+            let (picture, others) = group(count, usize::MAX, |group| drawn(group, &item, &camera, &options));
             let picture = picture.expect("a picture");
             assert!(picture.image == known.image && picture.segments == known.segments, "{count} processes");
             assert!(others.iter().all(Result::is_ok), "all end well: {others:?}");
