@@ -4,10 +4,13 @@
 //! [`case::Edit`]; [`scene`] turns a case and its data into what `render` draws, [`sections`] into what flat
 //! pictures show; [`headless`] runs jobs
 //! without a display and [`host`] the window, where [`tools`] live; [`save`] writes data files and pictures. [`steps`]
-//! are a volume over time. [`jobs`] runs what takes long in the background. [`sample`] makes the built-in hip, [`presets`] names transfer functions.
+//! are a volume over time. [`jobs`] runs what takes long in the background. [`sample`] makes the built-in hip, [`presets`] and [`colormaps`] name
+//! transfer functions, and [`added`] says what loaded data become in a case.
 
+pub mod added;
 pub mod case;
 pub mod cli;
+pub mod colormaps;
 pub mod headless;
 pub mod host;
 pub mod jobs;

@@ -5,12 +5,14 @@
 
 use std::sync::Arc;
 
-use render::scene::{Camera, Labels, MeshItem, Piece, Projection, Scene, VolumeItem};
-use render::volume::{Affine, Point, Vector};
+use render::scene::{Camera, CellItem, Labels, MeshItem, Piece, Projection, Scene, VolumeItem};
+use render::volume::cells::{Scalar, Step};
+use render::volume::{Affine, CellGrid, Point, Transfer, Vector};
 
 use crate::case::cuts::Cut;
 use crate::case::labels::{LabelSet, MAX_LABEL};
-use crate::case::{Assets, Case, Implant, Volume};
+use crate::case::{Assets, Case, Implant, UnstructuredGrid, Volume};
+use crate::colormaps::{COLORMAPS, OPACITY};
 
 /// Vertical field of view of a camera that the case does not give; degrees.
 pub const DEFAULT_FOV_DEG: f64 = 30.0;
@@ -19,11 +21,14 @@ pub const DEFAULT_FOV_DEG: f64 = 30.0;
 pub fn scene(case: &Case, assets: &Assets) -> Scene {
     let volumes: Vec<VolumeItem> = case.volumes.iter().filter_map(|v| volume(case, v, assets)).collect();
     let meshes: Vec<MeshItem> = case.implants.iter().filter_map(|i| implant(case, i, assets)).collect();
-    let camera = case.camera.unwrap_or_else(|| {
-        let bounds = bounds(&volumes, &meshes).unwrap_or([Point::from([-100.0; 3]), Point::from([100.0; 3])]);
-        fit(bounds, Vector::y(), Vector::z())
-    });
-    Scene { volumes, meshes, camera, background: case.background }
+    let grids: Vec<CellItem> = case.grids.iter().filter_map(|g| grid(case, g, assets)).collect();
+    let around = |bounds| fit(bounds, Vector::y(), Vector::z());
+    let camera = around([Point::from([-100.0; 3]), Point::from([100.0; 3])]);
+    let mut scene = Scene { volumes, meshes, grids, camera, background: case.background };
+    if let Some(camera) = case.camera.or_else(|| bounds(&scene).map(around)) {
+        scene.camera = camera;
+    }
+    scene
 }
 
 fn volume(case: &Case, volume: &Volume, assets: &Assets) -> Option<VolumeItem> {
@@ -87,16 +92,82 @@ pub fn implant_cut(case: &Case, implant: &Implant, assets: &Assets) -> Option<Cu
     Some(assets.cuts().cut(&implant.id, mesh, &world_from_model(implant), case.sides(&implant.keep)))
 }
 
+fn grid(case: &Case, grid: &UnstructuredGrid, assets: &Assets) -> Option<CellItem> {
+    if !grid.visible {
+        return None;
+    }
+    let cells = assets.cells(grid)?;
+    let scalar = scalar_of(grid, cells)?;
+    let transfer = transfer_of(grid, cells, &scalar);
+    let pose = world_from_grid(case, grid);
+    // A file may have fewer steps than it had.
+    let step = grid.step.min(cells.steps().len() - 1);
+    Some(CellItem { grid: Arc::clone(cells), step, scalar, pose, transfer })
+}
+
+/// The scalar that a grid shows; nothing where its data have none, or not the one that is chosen.
+pub fn scalar_of(grid: &UnstructuredGrid, cells: &CellGrid) -> Option<Scalar> {
+    grid.field.as_ref().map_or_else(|| cells.first_scalar(), |choice| choice.of(cells))
+}
+
+/// The colours and opacities of a grid: its own, or the default ones over the scalar's range.
+pub fn transfer_of(grid: &UnstructuredGrid, cells: &CellGrid, scalar: &Scalar) -> Arc<Transfer> {
+    let default = || {
+        let [low, high] = cells.bounds();
+        let unit_mm = (high - low).norm() * grid.scale / 100.0;
+        let range = scalar.range(cells).unwrap_or([0.0, 1.0]);
+        Arc::new(COLORMAPS[0].transfer(range, OPACITY, unit_mm))
+    };
+    grid.transfer.clone().unwrap_or_else(default)
+}
+
+/// Why a grid whose data are loaded cannot be shown; nothing where it can, or where they are not.
+pub fn grid_fault(grid: &UnstructuredGrid, assets: &Assets) -> Option<String> {
+    let cells = assets.cells(grid)?;
+    if scalar_of(grid, cells).is_some() {
+        return None;
+    }
+    let known = |step: &Step| {
+        let all = step.point_fields.iter().chain(&step.cell_fields).map(|f| format!("\"{}\"", f.name()));
+        all.collect::<Vec<_>>().join(", ")
+    };
+    let known = cells.steps().first().map(known).unwrap_or_default();
+    let (id, source) = (&grid.id, &grid.source);
+    Some(match &grid.field {
+        _ if known.is_empty() => {
+            format!("grid \"{id}\" has no field that could be shown; choose another file: {source}")
+        }
+        Some(choice) => {
+            let name = &choice.name;
+            format!(
+                "grid \"{id}\" has no field \"{name}\" with that component there; choose one of {known}: {source}"
+            )
+        }
+        None => format!("grid \"{id}\" has no scalar in its first step; choose one of {known}: {source}"),
+    })
+}
+
+/// Where a grid's own coordinates lie: its pose after its scale, and where it rides on a fragment, moved with that.
+pub fn world_from_grid(case: &Case, grid: &UnstructuredGrid) -> Affine {
+    let placed = scaled(grid.pose, grid.scale);
+    let fragment = grid.fragment.as_deref().and_then(|id| case.fragment(id));
+    fragment.map_or(placed, |fragment| fragment.pose * placed)
+}
+
 /// Where the model's own coordinates lie: its pose after its scale.
 pub fn world_from_model(implant: &Implant) -> Affine {
-    if implant.scale == 1.0 {
-        return implant.pose;
+    scaled(implant.pose, implant.scale)
+}
+
+/// A rigid pose after a scale.
+fn scaled(pose: Affine, s: f64) -> Affine {
+    if s == 1.0 {
+        return pose;
     }
-    let s = implant.scale;
     let axes = [Vector::x() * s, Vector::y() * s, Vector::z() * s];
     // A scale is checked to be positive and finite; one so small that it flattens space is as if unscaled.
     Affine::from_columns(axes[0], axes[1], axes[2], Point::origin())
-        .map_or(implant.pose, |mm_from_model| implant.pose * mm_from_model)
+        .map_or(pose, |mm_from_model| pose * mm_from_model)
 }
 
 /// The corners of a volume's box in its unmoved place, world mm: what [`crate::case::Edit::Split`] asks for.
@@ -107,14 +178,14 @@ pub fn unmoved_corners(volume: &Volume, assets: &Assets) -> Option<[Point; 8]> {
 
 /// Least and greatest coordinates of everything drawn; world mm. Fragments count with the part of
 /// their volume's box that planes leave them, moved; none where nothing is drawn.
-pub fn bounds(volumes: &[VolumeItem], meshes: &[MeshItem]) -> Option<[Point; 2]> {
+pub fn bounds(scene: &Scene) -> Option<[Point; 2]> {
     let mut low = Point::from([f64::INFINITY; 3]);
     let mut high = Point::from([f64::NEG_INFINITY; 3]);
     let mut take = |p: Point| {
         low = low.inf(&p);
         high = high.sup(&p);
     };
-    for item in volumes {
+    for item in &scene.volumes {
         let corners = item.grid.corners_in_world().map(|p| item.pose.point(&p));
         for piece in &item.pieces {
             for p in crate::case::split::hull_of(&piece.keep, &corners) {
@@ -122,8 +193,13 @@ pub fn bounds(volumes: &[VolumeItem], meshes: &[MeshItem]) -> Option<[Point; 2]>
             }
         }
     }
-    for item in meshes {
+    for item in &scene.meshes {
         for p in item.mesh.positions() {
+            take(item.pose.point(p));
+        }
+    }
+    for item in &scene.grids {
+        for p in item.grid.points() {
             take(item.pose.point(p));
         }
     }

@@ -121,6 +121,9 @@ impl Gathered {
         caches: &mut Caches,
         limits: Limits,
     ) -> Result<Self, GpuError> {
+        if !scene.grids.is_empty() {
+            return Err(GpuError::CpuOnly { what: "an unstructured grid" });
+        }
         let mut all = Self::default();
         caches.tables.begin();
         // Each volume has an equal share of what all may take.

@@ -92,6 +92,11 @@ pub struct Stats {
     pub tiles_skipped: u64,
     /// By the CPU: cells of volumes that rays went through.
     pub cells: u64,
+    /// By the CPU: tetrahedra of unstructured grids.
+    pub tetrahedra: u64,
+    /// By the CPU: those scan-converted, once for each strip of the picture that they are before; the others are clear or
+    /// beside the picture.
+    pub tetrahedra_scanned: u64,
     /// By the CPU: pixels that were done before their ray's end.
     pub pixels_finished: u64,
     /// By the CPU: volumes made ready for this picture; the others were.

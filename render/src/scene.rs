@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
+use crate::volume::cells::{CellGrid, Scalar};
 use crate::volume::{Affine, Cutter, Grid, PackedStep, Point, Side, Transfer, TriangleMesh, Vector};
 
 /// How a surface or a volume is lit.
@@ -155,6 +156,21 @@ pub struct VolumeItem {
     pub mode: VolumeMode,
 }
 
+/// An unstructured grid to draw; unlit.
+#[derive(Debug, Clone)]
+pub struct CellItem {
+    /// Points, cells and fields.
+    pub grid: Arc<CellGrid>,
+    /// Which of the grid's steps.
+    pub step: usize,
+    /// Which scalar.
+    pub scalar: Scalar,
+    /// `world_from_grid`.
+    pub pose: Affine,
+    /// Colour and opacity.
+    pub transfer: Arc<Transfer>,
+}
+
 /// A surface to draw; every crossing of a ray with it composites, front and back faces alike.
 #[derive(Debug, Clone)]
 pub struct MeshItem {
@@ -261,6 +277,8 @@ pub struct Scene {
     pub volumes: Vec<VolumeItem>,
     /// Surfaces.
     pub meshes: Vec<MeshItem>,
+    /// Unstructured grids.
+    pub grids: Vec<CellItem>,
     /// The view.
     pub camera: Camera,
     /// Display colour behind everything.

@@ -193,7 +193,7 @@ fn parallel() -> Camera {
 }
 
 fn scene(volumes: Vec<VolumeItem>, meshes: Vec<MeshItem>) -> Scene {
-    Scene { volumes, meshes, camera: perspective(), background: [0.1, 0.2, 0.3] }
+    Scene { volumes, meshes, grids: Vec::new(), camera: perspective(), background: [0.1, 0.2, 0.3] }
 }
 
 /// A closed box as a mesh.

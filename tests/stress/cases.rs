@@ -49,7 +49,7 @@ pub(super) fn any(random: &mut Random, contents: Contents) -> Case {
     }
     let camera = camera(random, &volumes, size_mm);
     let background = random.one(&[[0.0; 3], [1.0; 3], [0.1, 0.2, 0.3]]);
-    Case { scene: Scene { volumes, meshes, camera, background }, size_mm }
+    Case { scene: Scene { volumes, meshes, grids: Vec::new(), camera, background }, size_mm }
 }
 
 /// The corners of a volume's box, where `pose` takes it.
@@ -150,7 +150,7 @@ fn values(random: &mut Random, extent: [usize; 3]) -> Vec<f64> {
 }
 
 /// A transfer function over a range of values: ramps, jumps, doubled points, opacity from 0 to 1.
-fn transfer(random: &mut Random, [low, high]: [f64; 2], size: f64) -> Transfer {
+pub(super) fn transfer(random: &mut Random, [low, high]: [f64; 2], size: f64) -> Transfer {
     let span = (high - low).max(1.0);
     let mut at = low - random.between(-0.5, 0.5) * span;
     let mut points = Vec::new();
@@ -231,6 +231,9 @@ pub(super) fn moved(scene: &Scene, by: &Affine) -> Scene {
     }
     for mesh in &mut scene.meshes {
         mesh.pose = *by * mesh.pose;
+    }
+    for grid in &mut scene.grids {
+        grid.pose = *by * grid.pose;
     }
     scene.camera.eye = by.point(&scene.camera.eye);
     scene.camera.target = by.point(&scene.camera.target);

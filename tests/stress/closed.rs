@@ -38,7 +38,7 @@ fn cube(voxels: usize, value: f64, points: Vec<ControlPoint>, unit_mm: f64) -> S
         up: Vector::z(),
         projection: Projection::Parallel { height_mm: 12.0 },
     };
-    Scene { volumes: vec![volume], meshes: Vec::new(), camera, background: [0.0; 3] }
+    Scene { volumes: vec![volume], meshes: Vec::new(), grids: Vec::new(), camera, background: [0.0; 3] }
 }
 
 fn point(value: f64, opacity: f64) -> ControlPoint {

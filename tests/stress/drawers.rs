@@ -20,11 +20,16 @@ pub(super) struct Drawer {
 
 /// All that are measured against the reference.
 pub(super) fn all() -> Vec<Drawer> {
-    let mut drawers = vec![Drawer { name: "cpu", draw: by_cpu }];
+    let mut drawers = vec![processor()];
     if gpu_wanted() {
         drawers.push(Drawer { name: "gpu", draw: by_gpu });
     }
     drawers
+}
+
+/// The processor's.
+pub(super) fn processor() -> Drawer {
+    Drawer { name: "cpu", draw: by_cpu }
 }
 
 /// The picture as it is defined.

@@ -8,6 +8,7 @@
 mod cases;
 mod closed;
 mod drawers;
+mod grids;
 mod identities;
 mod judge;
 mod parts;

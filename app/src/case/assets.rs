@@ -1,15 +1,15 @@
-//! What the sources of a case name, loaded: grids and surfaces, shared by `Arc`, keyed by source.
+//! What the sources of a case name, loaded: volumes, surfaces and unstructured grids, shared by `Arc`, keyed by source.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use render::volume::{Grid, TriangleMesh};
+use render::volume::{CellGrid, Grid, TriangleMesh};
 use thiserror::Error;
 
 use super::cuts::Cuts;
 use super::label_grid::{LabelGrid, LabelGrids};
-use super::{Case, Implant, LabelSet, Source, Volume};
+use super::{Case, Implant, LabelSet, Source, UnstructuredGrid, Volume};
 use crate::load::{self, Content, Item, Limits, LoadError, Note, Progress};
 use crate::sample;
 use crate::steps::{self, SeriesFileError, Steps};
@@ -21,6 +21,8 @@ pub enum Kind {
     Volume,
     /// A [`TriangleMesh`].
     Surface,
+    /// A [`CellGrid`].
+    Cells,
 }
 
 /// Which data.
@@ -45,13 +47,18 @@ impl Key {
         Some(Self { source: set.source.clone()?, kind: Kind::Volume, item: set.item })
     }
 
+    /// What an unstructured grid needs.
+    pub fn of_grid(grid: &UnstructuredGrid) -> Self {
+        Self { source: grid.source.clone(), kind: Kind::Cells, item: grid.item }
+    }
+
     /// What an implant needs.
     pub fn of_implant(implant: &Implant) -> Self {
         Self { source: implant.source.clone(), kind: Kind::Surface, item: implant.item }
     }
 }
 
-/// Samples or triangles.
+/// Samples, triangles or cells.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Data {
@@ -61,15 +68,17 @@ pub enum Data {
     Steps(Arc<Steps>),
     /// A surface.
     Mesh(Arc<TriangleMesh>),
+    /// An unstructured grid.
+    Cells(Arc<CellGrid>),
 }
 
 impl Data {
-    /// Least and greatest value of a volume, over all its steps; none of a surface.
+    /// Least and greatest value of a volume, over all its steps; none of anything else.
     pub fn range(&self) -> Option<[f64; 2]> {
         match self {
             Self::Grid(grid) => Some(grid.range()),
             Self::Steps(steps) => Some(steps.range()),
-            Self::Mesh(_) => None,
+            Self::Mesh(_) | Self::Cells(_) => None,
         }
     }
 }
@@ -104,7 +113,7 @@ pub enum AssetError {
     /// The source has no such item.
     #[error("holds {found} {kind}, so item {item} is not there; choose another file or item: {}", path.display())]
     NoItem {
-        /// `volumes` or `surfaces`.
+        /// `volumes`, `surfaces` or `unstructured grids`.
         kind: &'static str,
         /// How many there are.
         found: usize,
@@ -140,7 +149,7 @@ impl Assets {
         match &self.loaded.get(&Key::of_volume(volume))?.data {
             Data::Grid(grid) => Some(Arc::clone(grid)),
             Data::Steps(steps) => steps.grid(volume.step),
-            Data::Mesh(_) => None,
+            Data::Mesh(_) | Data::Cells(_) => None,
         }
     }
 
@@ -148,7 +157,7 @@ impl Assets {
     pub fn steps(&self, volume: &Volume) -> Option<&Arc<Steps>> {
         match &self.loaded.get(&Key::of_volume(volume))?.data {
             Data::Steps(steps) => Some(steps),
-            Data::Grid(_) | Data::Mesh(_) => None,
+            Data::Grid(_) | Data::Mesh(_) | Data::Cells(_) => None,
         }
     }
 
@@ -156,7 +165,15 @@ impl Assets {
     pub fn mesh(&self, implant: &Implant) -> Option<&Arc<TriangleMesh>> {
         match &self.loaded.get(&Key::of_implant(implant))?.data {
             Data::Mesh(mesh) => Some(mesh),
-            Data::Grid(_) | Data::Steps(_) => None,
+            Data::Grid(_) | Data::Steps(_) | Data::Cells(_) => None,
+        }
+    }
+
+    /// The cells of an unstructured grid, where loaded.
+    pub fn cells(&self, grid: &UnstructuredGrid) -> Option<&Arc<CellGrid>> {
+        match &self.loaded.get(&Key::of_grid(grid))?.data {
+            Data::Cells(cells) => Some(cells),
+            Data::Grid(_) | Data::Steps(_) | Data::Mesh(_) => None,
         }
     }
 
@@ -168,7 +185,7 @@ impl Assets {
             Some(key) => match &self.loaded.get(&key)?.data {
                 Data::Grid(grid) => Arc::clone(grid),
                 Data::Steps(steps) => steps.grid(0)?,
-                Data::Mesh(_) => return None,
+                Data::Mesh(_) | Data::Cells(_) => return None,
             },
         };
         Some(self.label_grids.grid(set, &base))
@@ -200,10 +217,15 @@ impl Assets {
     pub fn missing(&self, case: &Case) -> Vec<Key> {
         let volumes = case.volumes.iter().filter(|v| v.visible).map(Key::of_volume);
         let implants = case.implants.iter().filter(|i| i.visible).map(Key::of_implant);
+        let grids = case.grids.iter().filter(|g| g.visible).map(Key::of_grid);
         let on_shown = |l: &&LabelSet| l.visible && case.volume(&l.volume).is_some_and(|v| v.visible);
         let labels = case.labels.iter().filter(on_shown).filter_map(Key::of_labels);
-        let mut keys: Vec<Key> =
-            volumes.chain(implants).chain(labels).filter(|k| !self.loaded.contains_key(k)).collect();
+        let mut keys: Vec<Key> = volumes
+            .chain(implants)
+            .chain(labels)
+            .chain(grids)
+            .filter(|k| !self.loaded.contains_key(k))
+            .collect();
         keys.sort();
         keys.dedup();
         keys
@@ -248,7 +270,11 @@ pub fn load_keys(
         all.iter().find(|a| a.key == *key).cloned().ok_or_else(|| match &key.source {
             Source::Builtin(name) => AssetError::NoBuiltin { name: name.clone() },
             Source::Path(path) => AssetError::NoItem {
-                kind: if key.kind == Kind::Volume { "volumes" } else { "surfaces" },
+                kind: match key.kind {
+                    Kind::Volume => "volumes",
+                    Kind::Surface => "surfaces",
+                    Kind::Cells => "unstructured grids",
+                },
                 found: found(),
                 item: key.item,
                 path: path.clone(),
@@ -258,7 +284,7 @@ pub fn load_keys(
     keys.iter().map(find).collect()
 }
 
-/// All volumes and surfaces of a source, numbered by kind. Things of other kinds are left out.
+/// All volumes, surfaces and unstructured grids of a source, numbered by kind.
 ///
 /// # Errors
 /// [`AssetError`].
@@ -301,7 +327,7 @@ pub fn open(
 }
 
 fn number(source: &Source, items: Vec<Item>) -> Vec<Arc<Asset>> {
-    let (mut volumes, mut surfaces) = (0, 0);
+    let (mut volumes, mut surfaces, mut cells) = (0, 0, 0);
     let mut assets = Vec::new();
     for item in items {
         let (data, kind, count) = match item.content {
@@ -310,7 +336,7 @@ fn number(source: &Source, items: Vec<Item>) -> Vec<Arc<Asset>> {
                 (Data::Steps(Arc::new(Steps::in_memory(series))), Kind::Volume, &mut volumes)
             }
             Content::Mesh(mesh) => (Data::Mesh(Arc::new(mesh)), Kind::Surface, &mut surfaces),
-            Content::Cells(_) => continue,
+            Content::Cells(grid) => (Data::Cells(Arc::new(grid)), Kind::Cells, &mut cells),
         };
         let key = Key { source: source.clone(), kind, item: *count };
         *count += 1;

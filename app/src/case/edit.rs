@@ -7,6 +7,7 @@ use render::scene::{Camera, CameraError, Shading, TextureFormat, VolumeMode};
 use render::volume::{Affine, Cutter, Point, Side, SpaceError, Transfer};
 use thiserror::Error;
 
+use super::grids::{GridChange, UnstructuredGrid};
 use super::labels::{LabelChange, LabelSet};
 use super::{Fragment, Implant, NamedCutter, Volume, split};
 
@@ -110,6 +111,15 @@ pub enum Edit {
         id: String,
         /// What changes.
         change: LabelChange,
+    },
+    /// A new unstructured grid at the end of the list.
+    AddGrid(Box<UnstructuredGrid>),
+    /// A change to an unstructured grid.
+    ChangeGrid {
+        /// The grid.
+        id: String,
+        /// What changes.
+        change: GridChange,
     },
     /// A new cutter at the end of the list.
     AddCutter(NamedCutter),
@@ -268,7 +278,7 @@ pub enum EditError {
     /// Nothing of that kind has the id.
     #[error("there is no {kind} \"{id}\"")]
     Missing {
-        /// Volume, cutter, fragment or implant.
+        /// Volume, cutter, fragment, implant or grid.
         kind: &'static str,
         /// As asked for.
         id: String,
@@ -276,7 +286,7 @@ pub enum EditError {
     /// The id is taken.
     #[error("there is already a {kind} \"{id}\"; choose another name")]
     Taken {
-        /// Volume, cutter, fragment or implant.
+        /// Volume, cutter, fragment, implant or grid.
         kind: &'static str,
         /// As asked for.
         id: String,
@@ -284,7 +294,7 @@ pub enum EditError {
     /// The id is empty.
     #[error("a {kind} needs a name that is not empty")]
     Nameless {
-        /// Volume, cutter, fragment or implant.
+        /// Volume, cutter, fragment, implant or grid.
         kind: &'static str,
     },
     /// Something still refers to it.
@@ -359,6 +369,11 @@ impl Edit {
             return false;
         }
         if let (Self::ChangeLabels { id: a, change }, Self::ChangeLabels { id: b, change: before }) =
+            (self, earlier)
+        {
+            return a == b && change.continues(before);
+        }
+        if let (Self::ChangeGrid { id: a, change }, Self::ChangeGrid { id: b, change: before }) =
             (self, earlier)
         {
             return a == b && change.continues(before);

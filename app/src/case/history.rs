@@ -10,6 +10,7 @@
 use std::collections::VecDeque;
 
 use super::edit::apply;
+use super::grids::GridChange;
 use super::{Case, Edit, EditError};
 
 /// A pause of this length ends a drag; seconds.
@@ -53,7 +54,8 @@ impl History {
     /// # Errors
     /// [`EditError`]; the case and its past are as they were.
     pub fn edit(&mut self, edit: Edit, now_secs: f64) -> Result<(), EditError> {
-        if matches!(edit, Edit::SetCamera(_) | Edit::SetStep { .. }) {
+        let shows_time = matches!(&edit, Edit::ChangeGrid { change: GridChange::Step(_), .. });
+        if shows_time || matches!(edit, Edit::SetCamera(_) | Edit::SetStep { .. }) {
             return apply(&mut self.case, edit);
         }
         let mut changed = self.case.clone();
@@ -143,6 +145,11 @@ fn keep_view(case: &mut Case, shown: &Case) {
     for volume in &mut case.volumes {
         if let Some(now) = shown.volume(&volume.id) {
             volume.step = now.step;
+        }
+    }
+    for grid in &mut case.grids {
+        if let Some(now) = shown.grid(&grid.id) {
+            grid.step = now.step;
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The case: what is planned, as plain data. Volumes, cutters, fragments, implants and the view.
+//! The case: what is planned, as plain data. Volumes, cutters, fragments, implants, grids and the view.
 //!
 //! A [`Case`] holds no samples and no triangles, so a clone is cheap and undo keeps whole copies. What
 //! the sources name is loaded into [`Assets`], shared by `Arc`. [`mod@file`] reads and writes it (see
@@ -20,6 +20,7 @@ pub mod assets;
 pub mod cuts;
 pub mod edit;
 pub mod file;
+pub mod grids;
 pub mod history;
 pub mod label_grid;
 pub mod labels;
@@ -30,6 +31,7 @@ mod write;
 pub use assets::Assets;
 pub use edit::{Edit, EditError};
 pub use file::FileError;
+pub use grids::UnstructuredGrid;
 pub use history::History;
 pub use labels::LabelSet;
 
@@ -242,6 +244,8 @@ pub struct Case {
     pub implants: Vec<Implant>,
     /// What is painted on volumes.
     pub labels: Vec<LabelSet>,
+    /// Results of simulations.
+    pub grids: Vec<UnstructuredGrid>,
     /// The view; none fits everything visible, seen from the front.
     pub camera: Option<Camera>,
     /// Unknown keys of the camera.
@@ -276,6 +280,11 @@ impl Case {
     /// The label set of that id.
     pub fn label_set(&self, id: &str) -> Option<&LabelSet> {
         self.labels.iter().find(|l| l.id == id)
+    }
+
+    /// The unstructured grid of that id.
+    pub fn grid(&self, id: &str) -> Option<&UnstructuredGrid> {
+        self.grids.iter().find(|g| g.id == id)
     }
 
     /// The label set that is drawn on a volume: the first visible one.
@@ -334,6 +343,11 @@ impl Case {
     /// A free id of a label set like `wish`.
     pub fn free_labels_id(&self, wish: &str) -> String {
         Self::free_id(wish, self.labels.iter().map(|l| l.id.as_str()))
+    }
+
+    /// A free grid id like `wish`.
+    pub fn free_grid_id(&self, wish: &str) -> String {
+        Self::free_id(wish, self.grids.iter().map(|g| g.id.as_str()))
     }
 
     /// A free implant id like `wish`.

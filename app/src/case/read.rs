@@ -18,6 +18,7 @@ use serde_json::{Map, Value};
 use super::{Case, Fragment, Implant, NamedCutter, Other, Source, Volume};
 
 mod extras;
+mod grids;
 
 /// A field that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -96,14 +97,26 @@ pub(super) fn case(document: Map<String, Value>, folder: &Path) -> Read<Case> {
     let fragments = fields.list("fragments", fragment)?;
     let implants = fields.list("implants", |v, at| implant(v, at, folder))?;
     let labels = fields.list("labels", |v, at| extras::labels(v, at, folder))?;
+    let grids = fields.list("grids", |v, at| grids::grid(v, at, folder))?;
     let (camera, camera_other) = match fields.take("camera") {
         Some((value, at)) => camera(value, at).map(|(camera, other)| (Some(camera), other))?,
         None => (None, Other::new()),
     };
     let background = fields.or("background", [0.0; 3], unit_numbers)?;
     let other = fields.map;
-    let case =
-        Case { name, volumes, cutters, fragments, implants, labels, camera, camera_other, background, other };
+    let case = Case {
+        name,
+        volumes,
+        cutters,
+        fragments,
+        implants,
+        labels,
+        grids,
+        camera,
+        camera_other,
+        background,
+        other,
+    };
     check_references(&case)?;
     Ok(case)
 }
@@ -126,6 +139,13 @@ fn check_references(case: &Case) -> Read<()> {
     unique("fragments", case.fragments.iter().map(|f| f.id.as_str()).collect())?;
     unique("implants", case.implants.iter().map(|i| i.id.as_str()).collect())?;
     unique("labels", case.labels.iter().map(|l| l.id.as_str()).collect())?;
+    unique("grids", case.grids.iter().map(|g| g.id.as_str()).collect())?;
+    for (i, grid) in case.grids.iter().enumerate() {
+        if let Some(id) = grid.fragment.as_deref().filter(|id| case.fragment(id).is_none()) {
+            let text = format!("names fragment \"{id}\", which is not among the fragments");
+            return fault(format!("grids[{i}].fragment"), text, "name one of the fragments");
+        }
+    }
     for (i, labels) in case.labels.iter().enumerate() {
         if case.volume(&labels.volume).is_none() {
             let text = format!("names volume \"{}\", which is not among the volumes", labels.volume);
@@ -278,10 +298,7 @@ fn implant(value: Value, at: String, folder: &Path) -> Read<Implant> {
     let source = source(value, at, folder)?;
     let item = fields.or("item", 0, whole)?;
     let pose = fields.or("pose", Affine::identity(), pose)?;
-    let scale = fields.or("scale", 1.0, |value, at| match number(value, at.clone())? {
-        scale if scale > 0.0 => Ok(scale),
-        scale => fault(at, format!("is {scale}, not more than 0"), "write the millimetres of one unit"),
-    })?;
+    let scale = fields.or("scale", 1.0, scale)?;
     let keep = fields.or("keep", BTreeMap::new(), keep)?;
     let color = fields.or("color", Implant::COLOR, unit_numbers)?;
     let opacity = fields.or("opacity", 1.0, |value, at| match number(value, at.clone())? {
@@ -292,6 +309,13 @@ fn implant(value: Value, at: String, folder: &Path) -> Read<Implant> {
     let shading = fields.or("shading", Shading::Lit, |v, at| shading(v, at, "headlight"))?;
     let other = fields.map;
     Ok(Implant { id, source, item, pose, scale, keep, color, opacity, visible, shading, other })
+}
+
+fn scale(value: Value, at: String) -> Read<f64> {
+    match number(value, at.clone())? {
+        scale if scale > 0.0 => Ok(scale),
+        scale => fault(at, format!("is {scale}, not more than 0"), "write the millimetres of one unit"),
+    }
 }
 
 fn camera(value: Value, at: String) -> Read<(Camera, Other)> {

@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
 use render::scene::{Projection, Shading, VolumeMode};
-use render::volume::{Shape, Side};
+use render::volume::cells::{Part, Place};
+use render::volume::{ControlPoint, Shape, Side, Transfer};
 use serde_json::{Map, Value, json};
 
-use super::{Case, Fragment, Implant, LabelSet, NamedCutter, Other, Source, Volume};
+use super::grids::FieldChoice;
+use super::{Case, Fragment, Implant, LabelSet, NamedCutter, Other, Source, UnstructuredGrid, Volume};
 
 /// A source whose path is not Unicode, which JSON cannot hold.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,6 +39,13 @@ pub(super) fn case(case: &Case, folder: &Path) -> Result<String, NotUnicode> {
             all.push(labels(l, folder)?);
         }
         put(&mut map, "labels", Value::Array(all));
+    }
+    if !case.grids.is_empty() {
+        let mut all = Vec::new();
+        for g in &case.grids {
+            all.push(grid(g, folder)?);
+        }
+        put(&mut map, "grids", Value::Array(all));
     }
     if let Some(camera) = &case.camera {
         let mut at = Map::new();
@@ -80,14 +89,7 @@ fn volume(v: &Volume, folder: &Path) -> Result<Value, NotUnicode> {
     put(&mut map, "pose", json!(v.pose.to_row_major()));
     put(&mut map, "visible", json!(v.visible));
     put(&mut map, "texture", json!(v.texture.name()));
-    let point = |p: &render::volume::ControlPoint| {
-        let [r, g, b, a] = p.rgba;
-        json!([p.value, r, g, b, a])
-    };
-    let mut transfer = Map::new();
-    put(&mut transfer, "points", v.transfer.points().iter().map(point).collect());
-    put(&mut transfer, "unit_mm", json!(v.transfer.unit_mm()));
-    put(&mut map, "transfer", with(transfer, &v.transfer_other));
+    put(&mut map, "transfer", transfer(&v.transfer, &v.transfer_other));
     put(&mut map, "shading", json!(shading_name(v.shading, "gradient")));
     match v.mode {
         VolumeMode::Composite => {}
@@ -100,6 +102,17 @@ fn volume(v: &Volume, folder: &Path) -> Result<Value, NotUnicode> {
         put(&mut map, "blend", json!(v.blend));
     }
     Ok(with(map, &v.other))
+}
+
+fn transfer(transfer: &Transfer, other: &Other) -> Value {
+    let point = |p: &ControlPoint| {
+        let [r, g, b, a] = p.rgba;
+        json!([p.value, r, g, b, a])
+    };
+    let mut map = Map::new();
+    put(&mut map, "points", transfer.points().iter().map(point).collect());
+    put(&mut map, "unit_mm", json!(transfer.unit_mm()));
+    with(map, other)
 }
 
 /// The name a file has for a texture format.
@@ -200,6 +213,50 @@ fn labels(l: &LabelSet, folder: &Path) -> Result<Value, NotUnicode> {
     put(&mut map, "colors", Value::Object(colors));
     put(&mut map, "visible", json!(l.visible));
     Ok(with(map, &l.other))
+}
+
+fn grid(g: &UnstructuredGrid, folder: &Path) -> Result<Value, NotUnicode> {
+    let mut map = Map::new();
+    put(&mut map, "id", json!(g.id));
+    put(&mut map, "source", source(&g.source, folder)?);
+    if g.item > 0 {
+        put(&mut map, "item", json!(g.item));
+    }
+    if g.step > 0 {
+        put(&mut map, "step", json!(g.step));
+    }
+    put(&mut map, "pose", json!(g.pose.to_row_major()));
+    if g.scale != 1.0 {
+        put(&mut map, "scale", json!(g.scale));
+    }
+    if let Some(fragment) = &g.fragment {
+        put(&mut map, "fragment", json!(fragment));
+    }
+    put(&mut map, "visible", json!(g.visible));
+    if let Some(field) = &g.field {
+        put(&mut map, "field", choice(field));
+    }
+    if !g.unit.is_empty() {
+        put(&mut map, "unit", json!(g.unit));
+    }
+    if let Some(of) = &g.transfer {
+        put(&mut map, "transfer", transfer(of, &g.transfer_other));
+    }
+    Ok(with(map, &g.other))
+}
+
+fn choice(choice: &FieldChoice) -> Value {
+    let mut map = Map::new();
+    put(&mut map, "name", json!(choice.name));
+    if let Some(place) = choice.place {
+        put(&mut map, "on", json!(if place == Place::Points { "points" } else { "cells" }));
+    }
+    match choice.part {
+        Some(Part::Component(component)) => put(&mut map, "part", json!(component)),
+        Some(Part::Magnitude) => put(&mut map, "part", json!("magnitude")),
+        None => {}
+    }
+    Value::Object(map)
 }
 
 fn source(source: &Source, folder: &Path) -> Result<Value, NotUnicode> {

@@ -62,6 +62,11 @@ fn write(key: &Key, folder: &Path) -> Result<PathBuf, Failure> {
             series::write(&path, steps, &name, "", SeriesOptions::default(), &Silent)?;
             return Ok(path);
         }
+        Data::Cells(_) => {
+            return Err(Failure::Other(format!(
+                "the built-in {name} is an unstructured grid; please report this"
+            )));
+        }
     };
     write_file(&path, &bytes)?;
     Ok(path)

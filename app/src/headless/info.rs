@@ -103,6 +103,7 @@ fn case_json(case: &Case, path: &Path) -> Value {
         "cutters": case.cutters.iter().map(|c| c.id.clone()).collect::<Vec<_>>(),
         "fragments": case.fragments.iter().map(|f| f.id.clone()).collect::<Vec<_>>(),
         "implants": case.implants.iter().map(|i| source(&i.id, &i.source)).collect::<Vec<_>>(),
+        "grids": case.grids.iter().map(|g| source(&g.id, &g.source)).collect::<Vec<_>>(),
         "notes": [],
     })
 }

@@ -1,13 +1,12 @@
 //! What a job works on: a case with its data, from a case file, or made of a data file or folder.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use super::{Failure, Terminal};
 use crate::case::assets;
-use crate::case::{Assets, Case, Implant, Source, Volume, file};
+use crate::case::{Assets, Case, Source, Volume, edit, file};
 use crate::load::Limits;
-use crate::{presets, sample};
+use crate::{added, sample, scene};
 
 /// A case whose visible data are loaded.
 #[derive(Debug)]
@@ -34,8 +33,9 @@ pub fn open(path: &Path) -> Result<Input, Failure> {
         return load(case);
     }
     let input = of_source(&Source::path(path))?;
-    if input.case.volumes.is_empty() && input.case.implants.is_empty() {
-        let fault = "the data hold no volume and no surface; choose a file that does";
+    let Case { volumes, implants, grids, .. } = &input.case;
+    if volumes.is_empty() && implants.is_empty() && grids.is_empty() {
+        let fault = "the data hold no volume, no surface and no unstructured grid; choose a file that does";
         return Err(Failure::Unfit(format!("{fault}: {}", path.display())));
     }
     Ok(input)
@@ -50,7 +50,8 @@ pub fn of_source(source: &Source) -> Result<Input, Failure> {
     let mut assets = Assets::default();
     let mut case = Case { name: source.short_name(), ..Case::default() };
     for asset in found {
-        case_of(&mut case, &asset);
+        let edit = added::edit(&case, &asset);
+        edit::apply(&mut case, edit).map_err(|e| Failure::Other(e.to_string()))?;
         assets.insert(asset);
     }
     // Several series of one folder lie over each other: the largest is shown.
@@ -64,18 +65,23 @@ pub fn of_source(source: &Source) -> Result<Input, Failure> {
     for (i, volume) in case.volumes.iter_mut().enumerate() {
         volume.visible = Some(i) == largest;
     }
-    check_steps(&case, &assets)?;
+    check(&case, &assets)?;
     Ok(Input { case, assets })
 }
 
-/// A step that cannot be read would be left out of the picture: that is no picture of the case.
-fn check_steps(case: &Case, assets: &Assets) -> Result<(), Failure> {
+/// A step that cannot be read, or a field that is not there, would be left out of the picture: that is no picture of the case.
+fn check(case: &Case, assets: &Assets) -> Result<(), Failure> {
     for volume in case.volumes.iter().filter(|v| v.visible) {
         if let Some(steps) = assets.steps(volume)
             && assets.grid(volume).is_none()
         {
             let fault = steps.fault().unwrap_or_else(|| "a step cannot be read".to_owned());
             return Err(Failure::Unfit(format!("step {} of \"{}\": {fault}", volume.step, volume.id)));
+        }
+    }
+    for grid in case.grids.iter().filter(|g| g.visible) {
+        if let Some(fault) = scene::grid_fault(grid, assets) {
+            return Err(Failure::Unfit(fault));
         }
     }
     Ok(())
@@ -92,29 +98,14 @@ pub fn builtin() -> Result<Input, Failure> {
 fn load(case: Case) -> Result<Input, Failure> {
     let mut assets = Assets::default();
     assets.load_missing(&case, &Limits::default(), &Terminal::default())?;
-    check_steps(&case, &assets)?;
+    check(&case, &assets)?;
     Ok(Input { case, assets })
-}
-
-/// Adds data to a case as a volume or an implant of their own, with the defaults of their kind.
-fn case_of(case: &mut Case, asset: &assets::Asset) {
-    let wish = asset.key.source.short_name();
-    if let Some(range) = asset.data.range() {
-        let transfer = presets::default_for(asset.modality.as_deref(), range);
-        let id = case.free_volume_id(&wish);
-        let mut volume = Volume::new(id, asset.key.source.clone(), Arc::new(transfer));
-        volume.item = asset.key.item;
-        case.volumes.push(volume);
-    } else {
-        let mut implant = Implant::new(case.free_implant_id(&wish), asset.key.source.clone());
-        implant.item = asset.key.item;
-        case.implants.push(implant);
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::presets;
     use crate::save;
     use ::render::volume::{Affine, Grid, Rescale, Samples};
 

@@ -160,6 +160,8 @@ pub(super) fn figures(stats: &Stats, map: &mut Map<String, Value>) {
         "tiles": stats.tiles,
         "tiles_skipped": stats.tiles_skipped,
         "cells": stats.cells,
+        "tetrahedra": stats.tetrahedra,
+        "tetrahedra_scanned": stats.tetrahedra_scanned,
         "pixels_finished": stats.pixels_finished,
         "bands": stats.bands,
         "textures": textures,

@@ -27,7 +27,7 @@ pub fn run(args: &SectionArgs) -> Result<(), Failure> {
     let input = input::open(&args.input)?;
     let layers = sections::layers(&input.case, &input.assets, &BTreeMap::new());
     let drawn = scene::scene(&input.case, &input.assets);
-    let Some(bounds) = scene::bounds(&drawn.volumes, &drawn.meshes) else {
+    let Some(bounds) = scene::bounds(&drawn) else {
         let fault = "the case shows nothing; make a volume or an implant visible";
         return Err(Failure::Unfit(format!("{fault}: {}", args.input.display())));
     };

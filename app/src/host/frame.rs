@@ -328,7 +328,7 @@ impl Host {
     fn views_ui(&mut self, ui: &mut Ui, wishes: &mut Wishes) {
         let area = ui.available_rect_before_wrap();
         let scene = scene::scene(self.session.case(), self.session.assets());
-        let ball = Ball::about(scene::bounds(&scene.volumes, &scene.meshes).into_iter().flatten());
+        let ball = Ball::about(scene::bounds(&scene).into_iter().flatten());
         let layers = self.views.layers(self.session.case(), self.session.assets());
         let names = names(self.session.case(), self.session.assets());
         for (view, rect) in layout::cells(area, self.views.only) {
@@ -579,7 +579,8 @@ impl Host {
     }
 
     fn take_screenshot(&mut self, ctx: &egui::Context) {
-        let shows = !self.session.case().volumes.is_empty() || !self.session.case().implants.is_empty();
+        let Case { volumes, implants, grids, .. } = self.session.case();
+        let shows = !(volumes.is_empty() && implants.is_empty() && grids.is_empty());
         let at_rest = self.session.is_idle() && self.picture.is_at_rest(shows);
         let Some(done) = self.screenshot.as_mut().and_then(|s| s.step(ctx, at_rest)) else { return };
         if let Err(error) = done {

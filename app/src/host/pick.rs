@@ -121,7 +121,7 @@ mod tests {
             mode: Default::default(),
         };
         let camera = Facing::Anterior.camera(ball());
-        Scene { volumes: vec![item], meshes: Vec::new(), camera, background: [0.0; 3] }
+        Scene { volumes: vec![item], meshes: Vec::new(), grids: Vec::new(), camera, background: [0.0; 3] }
     }
 
     fn ray() -> Ray {

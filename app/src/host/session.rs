@@ -7,11 +7,12 @@ use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::added;
 use crate::case::assets::{self, Asset, Key};
-use crate::case::{Assets, Case, Edit, History, Implant, Source, Volume, file};
+use crate::case::grids::GridChange;
+use crate::case::{Assets, Case, Edit, History, Source, file};
 use crate::jobs::{Job, Poll, Reporter, Step};
 use crate::load::{Limits, LoadError, Severity};
-use crate::presets;
 use crate::save::labels::{self, Saved};
 
 /// Something the user should read.
@@ -155,8 +156,9 @@ impl Session {
 
     /// Changes the case; a refusal becomes a [`Problem`].
     pub fn edit(&mut self, edit: Edit, now_secs: f64) {
-        if let Edit::SetVolumeVisible { visible: true, .. } | Edit::SetImplantVisible { visible: true, .. } =
-            edit
+        if let Edit::SetVolumeVisible { visible: true, .. }
+        | Edit::SetImplantVisible { visible: true, .. }
+        | Edit::ChangeGrid { change: GridChange::Visible(true), .. } = edit
         {
             self.failed.clear();
         }
@@ -337,33 +339,17 @@ impl Session {
     /// nothing to save.
     fn add(&mut self, found: &[Arc<Asset>], now_secs: f64) {
         if found.is_empty() {
-            self.complain("the file holds no volume and no surface; choose another");
+            self.complain("the file holds no volume, no surface and no unstructured grid; choose another");
             return;
         }
         let untouched = self.history.is_saved() && !self.history.can_undo() && self.path.is_none();
         for asset in found {
-            let edit = added(self.case(), asset);
+            let edit = added::edit(self.case(), asset);
             self.edit(edit, now_secs);
         }
         if untouched {
             self.history = History::new(self.case().clone());
         }
-    }
-}
-
-/// The change that puts loaded data into a case: a volume with its preset, or an implant.
-fn added(case: &Case, asset: &Asset) -> Edit {
-    let source = asset.key.source.clone();
-    let wish = source.short_name();
-    if let Some(range) = asset.data.range() {
-        let transfer = presets::default_for(asset.modality.as_deref(), range);
-        let mut volume = Volume::new(case.free_volume_id(&wish), source, Arc::new(transfer));
-        volume.item = asset.key.item;
-        Edit::AddVolume(Box::new(volume))
-    } else {
-        let mut implant = Implant::new(case.free_implant_id(&wish), source);
-        implant.item = asset.key.item;
-        Edit::AddImplant(Box::new(implant))
     }
 }
 
@@ -405,6 +391,7 @@ mod tests {
     use std::time::{Duration, Instant};
 
     use super::*;
+    use crate::case::Implant;
 
     fn session() -> Session {
         Session::new(Case::default(), Arc::new(|| ()))

@@ -201,7 +201,7 @@ pub fn ball_of(volume: &Volume, grid: &Grid) -> Ball {
 /// The ball about everything visible and loaded, fragments where they were moved to.
 pub fn ball_of_case(case: &Case, assets: &Assets) -> Ball {
     let scene = scene::scene(case, assets);
-    Ball::about(scene::bounds(&scene.volumes, &scene.meshes).into_iter().flatten())
+    Ball::about(scene::bounds(&scene).into_iter().flatten())
 }
 
 #[cfg(test)]

@@ -172,7 +172,7 @@ impl Dealt {
         ready: &Ready<'_>,
         queues: &[Vec<u32>],
     ) -> Result<Counts, LinkError> {
-        let (clusters, scalars) = (ready.clusters, ready.scalars);
+        let (clusters, scalars) = (&*ready.clusters, &*ready.scalars);
         let others = 1..desk.link.size();
         let mut sent = Counts::default();
         let mut send = |desk: &mut Desk<L>, to, message: Vec<u8>| {

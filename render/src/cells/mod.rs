@@ -15,7 +15,7 @@
 //!    lists are composited in order of depth. Grids may be of several parts, not convex, and cells may lie in a circle before
 //!    each other.
 //!
-//! **Meaning**: that of `crate::reference::cells`. The scalar is linear within each tetrahedron; fields of cells are constant
+//! **Meaning**: that of `crate::reference`. The scalar is linear within each tetrahedron; fields of cells are constant
 //! within each cell. Cells with a value that is not a number are left out, and counted. Where cells overlap, their optical
 //! depths add up, and colours are weighted by them, each cell or merged run of cells taken as the same all along its depth;
 //! grids that are sound have no such place.
@@ -26,6 +26,7 @@
 //! **Same bytes**: without early termination the picture and the segments do not depend on the number of workers, on the
 //! order of the grid's cells, or on the processor's instructions. With it they depend on the workers' timing, within its bound.
 
+mod among;
 mod bytes;
 mod clusters;
 mod early;
@@ -50,6 +51,7 @@ mod tests;
 mod wire;
 mod worker;
 
+pub(crate) use among::{Placed, Spans, Strip, Walker};
 pub use clusters::Faults;
 pub use early::Early;
 pub use engine::Engine;
@@ -66,11 +68,10 @@ use std::time::Instant;
 use thiserror::Error;
 
 use crate::image::FloatImage;
-use crate::scene::{Camera, CameraError};
+use crate::scene::{Camera, CameraError, CellItem};
 use crate::simd::has_wide;
 use crate::view::View;
-use crate::volume::cells::{CellGrid, Field, Place};
-use crate::volume::{Affine, Transfer};
+use crate::volume::cells::{CellGrid, Scalar};
 use clusters::{Clusters, Scalars};
 use engine::Jobs;
 use lens::Lens;
@@ -84,51 +85,6 @@ pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// Workers at most.
 pub const MAX_WORKERS: usize = 1024;
-
-/// Which scalar of a field is shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// One component.
-    Component(usize),
-    /// The length of the tuple as a vector.
-    Magnitude,
-}
-
-impl Part {
-    /// This of a tuple of a field; both must lie inside.
-    pub fn of(self, field: &Field, tuple: usize) -> f64 {
-        match self {
-            Self::Component(c) => field.value(tuple, c),
-            Self::Magnitude => field.magnitude(tuple),
-        }
-    }
-}
-
-/// A scalar of a grid.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Scalar {
-    /// Whether the field is on points or on cells.
-    pub place: Place,
-    /// The field's name.
-    pub name: String,
-    /// What of it.
-    pub part: Part,
-}
-
-/// A grid to draw.
-#[derive(Debug, Clone)]
-pub struct CellItem {
-    /// Points, cells and fields.
-    pub grid: Arc<CellGrid>,
-    /// Which of the grid's steps.
-    pub step: usize,
-    /// Which scalar.
-    pub scalar: Scalar,
-    /// `world_from_grid`.
-    pub pose: Affine,
-    /// Colour and opacity.
-    pub transfer: Arc<Transfer>,
-}
 
 /// How a picture of cells is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -262,8 +218,9 @@ impl Segments {
 #[derive(Debug)]
 struct Kept {
     grid: Weak<CellGrid>,
-    clusters: Clusters,
-    scalars: Option<(usize, Scalar, Scalars)>,
+    clusters: Arc<Clusters>,
+    /// Of steps: what was drawn last.
+    scalars: Vec<(usize, Scalar, Arc<Scalars>)>,
 }
 
 /// Draws grids. Keeps what it has made ready of a grid for as long as the grid lives.
@@ -307,7 +264,7 @@ impl CellRenderer {
 
     /// Checks what is asked for, and makes ready what is not.
     fn ready<'a>(
-        &'a mut self,
+        &mut self,
         item: &CellItem,
         camera: &Camera,
         size: [u32; 2],
@@ -331,27 +288,8 @@ impl CellRenderer {
             return Err(CellsError::Breaks);
         }
         let view = View::new(camera, size)?;
-        let steps = item.grid.steps();
-        let missing = CellsError::Step { step: item.step, count: steps.len() };
-        let step = steps.get(item.step).ok_or(missing)?;
-        let field = step.field(item.scalar.place, &item.scalar.name).filter(|field| match item.scalar.part {
-            Part::Component(c) => c < field.components(),
-            Part::Magnitude => true,
-        });
-        let field = field.ok_or_else(|| CellsError::Field { name: item.scalar.name.clone() })?;
-        self.kept.retain(|kept| kept.grid.strong_count() > 0);
-        let same = |kept: &Kept| kept.grid.as_ptr() == Arc::as_ptr(&item.grid);
-        let index = self.kept.iter().position(same).unwrap_or_else(|| {
-            let clusters = Clusters::new(&item.grid);
-            self.kept.push(Kept { grid: Arc::downgrade(&item.grid), clusters, scalars: None });
-            self.kept.len() - 1
-        });
-        let Kept { clusters, scalars, .. } = &mut self.kept[index];
-        let known = scalars.take().filter(|(s, scalar, _)| (*s, scalar) == (item.step, &item.scalar));
-        let (_, _, scalars) = scalars.insert(known.unwrap_or_else(|| {
-            let values = Scalars::new(clusters, item.scalar.place, |n| item.scalar.part.of(field, n));
-            (item.step, item.scalar.clone(), values)
-        }));
+        let prepared = self.prepare(std::slice::from_ref(item))?;
+        let Some((clusters, scalars)) = prepared.into_iter().next() else { return Err(CellsError::Workers) };
         let prepare_ms = begin.elapsed().as_secs_f64() * 1e3;
         Ok(Ready {
             clusters,
@@ -366,12 +304,45 @@ impl CellRenderer {
             begin: Instant::now(),
         })
     }
+
+    /// Makes ready what is not of grids and their scalars, and lets go of scalars that are not asked for.
+    fn prepare(&mut self, items: &[CellItem]) -> Result<Vec<(Arc<Clusters>, Arc<Scalars>)>, CellsError> {
+        self.kept.retain(|kept| kept.grid.strong_count() > 0);
+        let is_of = |item: &CellItem, grid: &Weak<CellGrid>| grid.as_ptr() == Arc::as_ptr(&item.grid);
+        for Kept { grid, scalars, .. } in &mut self.kept {
+            let mine = || items.iter().filter(|item| is_of(item, grid));
+            scalars.retain(|(step, scalar, _)| mine().any(|i| (i.step, &i.scalar) == (*step, scalar)));
+        }
+        let mut ready = Vec::with_capacity(items.len());
+        for item in items {
+            let steps = item.grid.steps();
+            let missing = CellsError::Step { step: item.step, count: steps.len() };
+            let step = steps.get(item.step).ok_or(missing)?;
+            let missing = || CellsError::Field { name: item.scalar.name.clone() };
+            let field = item.scalar.field(step).ok_or_else(missing)?;
+            let index = self.kept.iter().position(|kept| is_of(item, &kept.grid)).unwrap_or_else(|| {
+                let (grid, clusters) = (Arc::downgrade(&item.grid), Arc::new(Clusters::new(&item.grid)));
+                self.kept.push(Kept { grid, clusters, scalars: Vec::new() });
+                self.kept.len() - 1
+            });
+            let Kept { clusters, scalars, .. } = &mut self.kept[index];
+            let known = scalars.iter().find(|(step, scalar, _)| (*step, scalar) == (item.step, &item.scalar));
+            let values = known.map(|(_, _, values)| Arc::clone(values)).unwrap_or_else(|| {
+                let of = |n: usize| item.scalar.part.of(field, n);
+                let values = Arc::new(Scalars::new(clusters, item.scalar.place, of));
+                scalars.push((item.step, item.scalar.clone(), Arc::clone(&values)));
+                values
+            });
+            ready.push((Arc::clone(clusters), values));
+        }
+        Ok(ready)
+    }
 }
 
 /// What a picture is drawn from.
 struct Ready<'a> {
-    clusters: &'a Clusters,
-    scalars: &'a Scalars,
+    clusters: Arc<Clusters>,
+    scalars: Arc<Scalars>,
     table: Table,
     lens: Lens,
     size: [u32; 2],
@@ -385,8 +356,8 @@ struct Ready<'a> {
 impl Ready<'_> {
     fn frame(&self) -> Frame<'_> {
         Frame {
-            clusters: self.clusters,
-            scalars: self.scalars,
+            clusters: &self.clusters,
+            scalars: &self.scalars,
             table: &self.table,
             lens: self.lens,
             size: self.size,

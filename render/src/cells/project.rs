@@ -136,6 +136,99 @@ impl Projector {
         }
     }
 
+    /// Finds what the rays of a rectangle have of clusters, nearest first for each; see [`Projector::gathered`].
+    pub(super) fn gather(
+        &mut self,
+        frame: &Frame<'_>,
+        rect: &Rect,
+        clusters: impl Iterator<Item = usize>,
+        counts: &mut Counts,
+    ) {
+        self.counts.clear();
+        self.counts.resize(rect.area(), 0);
+        self.raws.clear();
+        for cluster in clusters {
+            if !frame.wide {
+                self.gather_cluster(frame, rect, cluster, counts);
+                continue;
+            }
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+                fn wide(
+                    projector: &mut Projector,
+                    frame: &Frame<'_>,
+                    rect: &Rect,
+                    cluster: usize,
+                    counts: &mut Counts,
+                ) {
+                    projector.gather_cluster(frame, rect, cluster, counts);
+                }
+                #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
+                // SAFETY: `wide` is set only where these instructions were detected.
+                unsafe {
+                    wide(self, frame, rect, cluster, counts);
+                }
+            }
+        }
+        counts.segments += self.raws.len() as u64;
+        self.order();
+        let mut from = 0;
+        for &to in &self.counts {
+            sort(&mut self.ordered[from..to as usize]);
+            from = to as usize;
+        }
+    }
+
+    /// What the ray of a pixel of the rectangle that was gathered for has, nearest first.
+    #[inline(always)]
+    pub(super) fn gathered(&self, pixel: usize) -> &[Raw] {
+        let from = if pixel == 0 { 0 } else { self.counts[pixel - 1] };
+        &self.ordered[from as usize..self.counts[pixel] as usize]
+    }
+
+    #[inline(always)]
+    fn gather_cluster(&mut self, frame: &Frame<'_>, rect: &Rect, cluster: usize, counts: &mut Counts) {
+        if frame.skip_clear && frame.table.is_clear(frame.scalars.range(cluster)) {
+            counts.clear += frame.clusters.count(cluster) as u64;
+            return;
+        }
+        self.place(frame, cluster);
+        self.choose(frame, cluster, rect, None, counts);
+        self.scan(frame, cluster, rect);
+    }
+
+    /// Brings corners and values of a cluster before the camera.
+    #[inline(always)]
+    fn place(&mut self, frame: &Frame<'_>, cluster: usize) {
+        let of_points = frame.scalars.place() == Place::Points;
+        let raw = frame.scalars.of(cluster);
+        self.values.clear();
+        self.values.extend(raw.iter().map(|&v| frame.table.position(v)));
+        self.corners.clear();
+        let points = frame.clusters.points(cluster).iter().enumerate();
+        let values = &self.values;
+        self.corners
+            .extend(points.map(|(i, p)| frame.lens.corner(p, if of_points { values[i] } else { 0.0 })));
+    }
+
+    /// Puts what was scan-converted together by pixel; `counts` become where each pixel's end.
+    #[inline(always)]
+    fn order(&mut self) {
+        let mut begin = 0;
+        for count in &mut self.counts {
+            (*count, begin) = (begin, begin + *count);
+        }
+        self.ordered.clear();
+        let Some(&any) = self.raws.first() else { return };
+        self.ordered.resize(self.raws.len(), any);
+        for raw in &self.raws {
+            let place = &mut self.counts[raw.pixel as usize];
+            self.ordered[*place as usize] = *raw;
+            *place += 1;
+        }
+    }
+
     #[inline(always)]
     fn project(
         &mut self,
@@ -159,15 +252,7 @@ impl Projector {
             counts.hidden += count;
             return;
         }
-        let of_points = frame.scalars.place() == Place::Points;
-        let raw = frame.scalars.of(cluster);
-        self.values.clear();
-        self.values.extend(raw.iter().map(|&v| frame.table.position(v)));
-        self.corners.clear();
-        let points = frame.clusters.points(cluster).iter().enumerate();
-        let values = &self.values;
-        self.corners
-            .extend(points.map(|(i, p)| frame.lens.corner(p, if of_points { values[i] } else { 0.0 })));
+        self.place(frame, cluster);
         self.choose(frame, cluster, &reach, early, counts);
         let mut top = reach.low[1];
         while top < reach.high[1] {
@@ -241,19 +326,10 @@ impl Projector {
         self.raws.clear();
         self.scan(frame, cluster, tile);
         counts.segments += self.raws.len() as u64;
-        // Each pixel's together: where they begin, then one after the other.
-        let mut begin = 0;
-        for count in &mut self.counts {
-            (*count, begin) = (begin, begin + *count);
+        if self.raws.is_empty() {
+            return;
         }
-        let Some(&any) = self.raws.first() else { return };
-        self.ordered.clear();
-        self.ordered.resize(self.raws.len(), any);
-        for raw in &self.raws {
-            let place = &mut self.counts[raw.pixel as usize];
-            self.ordered[*place as usize] = *raw;
-            *place += 1;
-        }
+        self.order();
         let [across, _] = tile.size();
         let mut from = 0;
         for (y, row) in (tile.low[1]..).zip(self.counts.chunks_exact(across)) {

@@ -251,7 +251,7 @@ impl Table {
 
     /// Optical depth times colour, and optical depth.
     #[inline(always)]
-    fn depth(&self, from: &Place, to: &Place, mm: f32) -> [f32; 4] {
+    pub(super) fn depth(&self, from: &Place, to: &Place, mm: f32) -> [f32; 4] {
         let rise = to.position - from.position;
         let piece = &self.pieces[from.piece];
         if rise.abs() * piece.scale > STILL {

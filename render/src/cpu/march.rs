@@ -4,6 +4,7 @@ use super::layered::Layered;
 use super::piece::{Placed, Stretches};
 use super::surfaces::Hit;
 use super::walker::{Ray, Walker};
+use crate::cells;
 
 /// What has come through so far.
 #[derive(Debug, Clone, Copy)]
@@ -22,6 +23,14 @@ impl Light {
         let weight = weight * self.through;
         self.color = [self.color[0] + r * weight, self.color[1] + g * weight, self.color[2] + b * weight];
         self.through *= left;
+    }
+
+    /// Passes what has this colour, premultiplied, and opacity.
+    fn layer(&mut self, [r, g, b, opacity]: [f32; 4]) {
+        for (sum, c) in self.color.iter_mut().zip([r, g, b]) {
+            *sum += self.through * c;
+        }
+        self.through *= 1.0 - opacity;
     }
 
     fn surface(&mut self, hit: &Hit) {
@@ -106,6 +115,8 @@ enum What {
     Begin(u32),
     End(u32),
     Surface(u32),
+    /// A grid begins or ends.
+    Grid,
 }
 
 /// A piece that may show in a tile, with its depths there.
@@ -117,6 +128,7 @@ pub(super) fn pixel(
     shown: &[Shown<'_>],
     layered: &[Layered<'_>],
     hits: &[Hit],
+    grids: &[cells::Spans<'_>],
     lens: [f64; 2],
     ray: &Ray,
     manner: Manner,
@@ -132,7 +144,7 @@ pub(super) fn pixel(
         }
     }
     let hits = if layered.is_empty() { hits } else { &scratch.hits[..] };
-    if let ([(piece, depths)], []) = (shown, hits) {
+    if let ([(piece, depths)], [], []) = (shown, hits, grids) {
         piece.stretches(lens, [f64::from(depths[0]), f64::from(depths[1])], &mut scratch.stretches);
         for &[from, to] in &scratch.stretches {
             let (from, to) = (from as f32, to as f32);
@@ -157,16 +169,20 @@ pub(super) fn pixel(
     for (index, hit) in hits.iter().enumerate() {
         scratch.stops.push(Stop { zeta: hit.zeta, what: What::Surface(index as u32) });
     }
+    for grid in grids {
+        scratch.stops.extend(grid.ends().map(|zeta| Stop { zeta, what: What::Grid }));
+    }
     // Stable: surfaces at one depth stay in their order.
     scratch.stops.sort_by(|a, b| a.zeta.total_cmp(&b.zeta));
     let mut walkers: Vec<(u32, Walker<'_>)> = Vec::new();
-    let mut at = f32::NEG_INFINITY;
+    let mut cells: Vec<cells::Walker<'_>> = grids.iter().map(|spans| spans.walker()).collect();
+    let mut at = scratch.stops.first().map_or(0.0, |stop| stop.zeta);
     for stop in &scratch.stops {
         if stop.zeta > at {
-            match &mut walkers[..] {
-                [] => {}
-                [(_, walker)] => march(walker, [at, stop.zeta], ray, manner, &mut light),
-                many => march_many(many, [at, stop.zeta], ray, manner, &mut light),
+            match (&mut walkers[..], &mut cells[..]) {
+                ([], []) => {}
+                ([(_, walker)], []) => march(walker, [at, stop.zeta], ray, manner, &mut light),
+                (many, cells) => march_many(many, cells, [at, stop.zeta], ray, manner, &mut light),
             }
             at = stop.zeta;
         }
@@ -180,6 +196,7 @@ pub(super) fn pixel(
                 !ends
             }),
             What::Surface(hit) => light.surface(&hits[hit as usize]),
+            What::Grid => {}
         }
         if light.through < manner.dark {
             work.finished += 1;
@@ -238,9 +255,10 @@ fn march(walker: &mut Walker<'_>, [from, to]: [f32; 2], ray: &Ray, manner: Manne
     }
 }
 
-/// Through several pieces at once: their extinctions add up.
+/// Through several pieces and cells of grids at once: their extinctions add up.
 fn march_many(
     walkers: &mut [(u32, Walker<'_>)],
+    cells: &mut [cells::Walker<'_>],
     [from, to]: [f32; 2],
     ray: &Ray,
     manner: Manner,
@@ -248,8 +266,20 @@ fn march_many(
 ) {
     let mut at = from;
     loop {
-        let end = walkers.iter().map(|(_, w)| w.next_bend(at)).fold(to, f32::min);
-        if end > at && walkers.iter().any(|(_, w)| !w.clear) {
+        let mut end = walkers.iter().map(|(_, w)| w.next_bend(at)).fold(to, f32::min);
+        for grid in cells.iter_mut() {
+            grid.reach(at);
+            end = end.min(grid.next_bend());
+        }
+        let in_cells = cells.iter().filter(|grid| !grid.is_clear()).count();
+        let in_pieces = walkers.iter().any(|(_, w)| !w.clear);
+        let alone = cells.iter_mut().find(|grid| !grid.is_clear() && !grid.is_many());
+        if let Some(grid) = alone.filter(|_| end > at && !in_pieces && in_cells == 1) {
+            light.layer(grid.segment([at, end], ray.mm_per_zeta));
+            if light.through < manner.dark {
+                return;
+            }
+        } else if end > at && (in_pieces || in_cells > 0) {
             let step = |before: f32, here: f32| {
                 let mut depth = [0.0; 4];
                 for (_, walker) in walkers.iter_mut().filter(|(_, w)| !w.clear) {
@@ -257,6 +287,10 @@ fn march_many(
                     for c in 0..4 {
                         depth[c] += part[c];
                     }
+                }
+                for grid in cells.iter_mut().filter(|grid| !grid.is_clear()) {
+                    let part = grid.step([before, here], ray.mm_per_zeta);
+                    depth = std::array::from_fn(|c| depth[c] + part[c]);
                 }
                 (depth[3] > 0.0).then_some(depth)
             };

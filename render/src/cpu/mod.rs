@@ -9,6 +9,8 @@
 //! 4. `march`, `walker`: a ray goes from one end, cut or surface to the next, in between from cell wall to cell
 //!    wall; on each step the scalar is taken as linear, and extinction is integrated exactly along it (`table`).
 //!    Any number of pieces and surfaces may meet: the extinctions of pieces that overlap add up.
+//! 5. Unstructured grids, scan-converted by `crate::cells` for a strip of the picture at a time, are walked on the same rays, from
+//!    cell to cell; where a piece or another grid lies in the same place, by the same steps.
 //!
 //! **Error**: second order in the length of the steps, which are at most [`Quality::voxels`] of a voxel and never
 //! longer than a cell; what lies behind a pixel that lets less than 1/1024 through is left out (1/512 in drafts,
@@ -40,9 +42,10 @@ use std::time::Instant;
 use rayon::prelude::*;
 use thiserror::Error;
 
+use crate::cells::{self, Breaks, CellRenderer, CellsError, Early, Spans, Strip};
 use crate::image::FloatImage;
 use crate::renderer::{Quality, Stats};
-use crate::scene::{CameraError, Scene, TextureFormat, VolumeItem, VolumeMode};
+use crate::scene::{CameraError, CellItem, Scene, TextureFormat, VolumeItem, VolumeMode};
 use crate::simd::has_wide;
 use crate::view::View;
 use crate::volume::{Grid, Point, Transfer};
@@ -71,9 +74,23 @@ pub enum CpuError {
         /// As asked for.
         height: u32,
     },
+    /// An unstructured grid cannot be shown.
+    #[error(transparent)]
+    Cells(CellsError),
     /// The caller said to stop.
     #[error("drawing was cancelled")]
     Cancelled,
+}
+
+impl From<CellsError> for CpuError {
+    fn from(error: CellsError) -> Self {
+        match error {
+            CellsError::Camera(error) => Self::Camera(error),
+            CellsError::Size { width, height } => Self::Size { width, height },
+            CellsError::Cancelled => Self::Cancelled,
+            other => Self::Cells(other),
+        }
+    }
 }
 
 /// The largest picture: 16 384 × 16 384, 4 GiB.
@@ -116,6 +133,9 @@ pub enum Instructions {
     Plain,
 }
 
+/// Bands at most that grids are scan-converted for at once.
+const STRIP: usize = 8;
+
 /// Pixels that may go at once, across and down.
 const BLOCK: [usize; 2] = [4, 2];
 
@@ -136,15 +156,17 @@ pub fn shows(scene: &Scene) -> bool {
     scene.volumes.iter().all(is_exact)
 }
 
-/// Whether only this renderer shows a scene, and not the passes: labels, MIP and isosurfaces.
+/// Whether only this renderer shows a scene, and not the passes: labels, MIP, isosurfaces and unstructured grids.
 pub fn alone_shows(scene: &Scene) -> bool {
-    scene.volumes.iter().any(|item| item.mode != VolumeMode::Composite || item.labels.is_some())
+    !scene.grids.is_empty()
+        || scene.volumes.iter().any(|item| item.mode != VolumeMode::Composite || item.labels.is_some())
 }
 
 /// Draws scenes. Keeps what it knows of volumes from picture to picture.
 #[derive(Debug, Default)]
 pub struct CpuRenderer {
     kept: Vec<Kept>,
+    cells: CellRenderer,
     skips: Skips,
     instructions: Instructions,
 }
@@ -170,8 +192,11 @@ impl CpuRenderer {
     /// Draws a picture of `size`, `[width, height]`, on all threads of the current pool: premultiplied, without
     /// background.
     ///
-    /// `progress` is told, from any thread, how many bands of the picture are done and of how many; as soon as it
-    /// answers `false` the drawing stops.
+    /// `progress` is told, from any thread, how much of the picture is done and of how much; as soon as it answers `false`
+    /// the drawing stops.
+    ///
+    /// An unstructured grid that is alone in the scene is drawn by [`CellRenderer`], in drafts with early termination at what
+    /// a draft may leave out; such drafts depend on the threads' timing, within that.
     ///
     /// # Errors
     /// All of [`CpuError`].
@@ -182,6 +207,9 @@ impl CpuRenderer {
         quality: Quality,
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> Result<(FloatImage, Stats), CpuError> {
+        if let ([], [], [grid]) = (&scene.volumes[..], &scene.meshes[..], &scene.grids[..]) {
+            return self.grid_alone(grid, scene, size, quality, progress);
+        }
         let begin = Instant::now();
         let [width, height] = size;
         let too_large = CpuError::Size { width, height };
@@ -194,6 +222,8 @@ impl CpuRenderer {
         pixels.resize(count as usize, [0.0_f32; 4]);
         let mut stats = Stats::default();
         let view = View::new(&scene.camera, size)?;
+        let wide = self.instructions == Instructions::Best && has_wide();
+        let grids = self.cells.place(&scene.grids, &view, self.skips.empty, wide)?;
         let ready = self.ready(scene, &mut stats);
         let placed = place(scene, &self.kept, &ready, &view, &mut stats);
         let rays = placed.rays;
@@ -211,32 +241,80 @@ impl CpuRenderer {
             *(if shown > 0 { &mut stats.fragments } else { &mut stats.fragments_skipped }) += 1;
         }
         stats.prepare_ms = begin.elapsed().as_secs_f64() * 1e3;
-        let wide = self.instructions == Instructions::Best && has_wide();
         let picture = Picture {
             placed: &placed.pieces,
             layered: &placed.layered,
             depths: &depths,
             surfaces: &surfaces,
+            grids: &grids,
             rays,
             manner,
             size,
             wide,
         };
         let counts = [const { AtomicU64::new(0) }; 3];
+        let tetrahedra = AtomicU64::new(0);
         let done = AtomicUsize::new(0);
         let (w, bands) = (width as usize, (height as usize).div_ceil(TILE));
-        let rows = pixels.par_chunks_mut(w * TILE).with_max_len(1).enumerate();
-        rows.try_for_each_init(Scratch::default, |scratch, (band, rows)| {
-            let (work, crossings) = picture.band(band, rows, scratch);
-            for (count, more) in counts.iter().zip([work.cells, work.finished, crossings]) {
-                count.fetch_add(more, Ordering::Relaxed);
+        // What is before a strip is scan-converted at once.
+        let per_strip =
+            if grids.is_empty() { 1 } else { STRIP.min(bands.div_ceil(4 * rayon::current_num_threads())) };
+        let strips = pixels.par_chunks_mut(w * TILE * per_strip).with_max_len(1).enumerate();
+        let fresh = || (Scratch::default(), grids.iter().map(|_| Strip::default()).collect::<Vec<_>>());
+        strips.try_for_each_init(fresh, |(scratch, cells), (strip, rows)| {
+            let first = strip * per_strip;
+            for (cells, grid) in cells.iter_mut().zip(&grids) {
+                cells.fill(grid, first * TILE..first * TILE + rows.len() / w);
+                let scanned = std::mem::take(&mut cells.counts).scanned;
+                tetrahedra.fetch_add(scanned, Ordering::Relaxed);
             }
-            let bands_done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            if progress(bands_done, bands) { Ok(()) } else { Err(CpuError::Cancelled) }
+            for (band, rows) in (first..).zip(rows.chunks_mut(w * TILE)) {
+                let cells = InStrip { list: cells, before: (band - first) * TILE * w };
+                let (work, crossings) = picture.band(band, rows, &cells, scratch);
+                for (count, more) in counts.iter().zip([work.cells, work.finished, crossings]) {
+                    count.fetch_add(more, Ordering::Relaxed);
+                }
+                let bands_done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                if !progress(bands_done, bands) {
+                    return Err(CpuError::Cancelled);
+                }
+            }
+            Ok(())
         })?;
         [stats.cells, stats.pixels_finished, stats.layers] = counts.map(AtomicU64::into_inner);
+        stats.tetrahedra = grids.iter().map(cells::Placed::tetrahedra).sum();
+        stats.tetrahedra_scanned = tetrahedra.into_inner();
         stats.frame_ms = begin.elapsed().as_secs_f64() * 1e3;
         Ok((FloatImage { width, height, pixels }, stats))
+    }
+
+    /// A scene of one grid and nothing else.
+    fn grid_alone(
+        &mut self,
+        grid: &CellItem,
+        scene: &Scene,
+        size: [u32; 2],
+        quality: Quality,
+        progress: &(dyn Fn(usize, usize) -> bool + Sync),
+    ) -> Result<(FloatImage, Stats), CpuError> {
+        let dark = f64::from(self.dark(quality));
+        let ends_early = quality == Quality::Draft && dark > 0.0;
+        let options = cells::Options {
+            early: ends_early.then(|| Early { threshold: 1.0 - dark, ..Early::default() }),
+            skip_clear: self.skips.empty,
+            wide: self.instructions == Instructions::Best,
+            ..cells::Options::default()
+        };
+        let drawn = self.cells.render(grid, &scene.camera, size, &options, Breaks::default(), progress)?;
+        let cells = &drawn.stats;
+        let stats = Stats {
+            frame_ms: cells.prepare_ms + cells.frame_ms,
+            prepare_ms: cells.prepare_ms,
+            tetrahedra: cells.tetrahedra,
+            tetrahedra_scanned: cells.total.scanned,
+            ..Stats::default()
+        };
+        Ok((drawn.image, stats))
     }
 
     /// What may be left out behind a pixel falls with the error of the steps, which goes with their square.
@@ -327,6 +405,10 @@ fn place<'a>(
             near = near.min(view_from_mesh.point(&Point::from(at)).z);
         }
     }
+    for item in &scene.grids {
+        let view_from_grid = view.view_from_world * item.pose;
+        near = item.grid.points().iter().fold(near, |near, p| near.min(view_from_grid.point(p).z));
+    }
     let rays = Rays::new(view, if near.is_finite() { near.max(0.0) } else { 0.0 });
     let (mut pieces, mut layered) = (Vec::new(), Vec::new());
     for (item, [volume, transfer]) in scene.volumes.iter().zip(ready) {
@@ -360,6 +442,7 @@ struct Picture<'a> {
     layered: &'a [Layered<'a>],
     depths: &'a [Depths],
     surfaces: &'a Surfaces,
+    grids: &'a [cells::Placed],
     rays: Rays,
     manner: Manner,
     size: [u32; 2],
@@ -367,23 +450,43 @@ struct Picture<'a> {
     wide: bool,
 }
 
+/// What the rays of a row of tiles have of each grid.
+#[derive(Debug, Clone, Copy)]
+struct InStrip<'a> {
+    list: &'a [Strip],
+    /// Pixels of the strip before the row of tiles.
+    before: usize,
+}
+
 impl Picture<'_> {
     /// Draws a row of tiles; the work it was, and the crossings of surfaces in it. The same source for every kind of
     /// instructions, and no fused multiply-add, so that all give the same bytes.
-    fn band(&self, band: usize, rows: &mut [[f32; 4]], scratch: &mut Scratch) -> (Work, u64) {
+    fn band(
+        &self,
+        band: usize,
+        rows: &mut [[f32; 4]],
+        cells: &InStrip<'_>,
+        scratch: &mut Scratch,
+    ) -> (Work, u64) {
         #[cfg(target_arch = "x86_64")]
         if self.wide {
             #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
             // SAFETY: they were detected.
-            return unsafe { self.band_avx2(band, rows, scratch) };
+            return unsafe { self.band_avx2(band, rows, cells, scratch) };
         }
-        self.tiles(band, rows, scratch, &|_, _, _, _| None)
+        self.tiles(band, rows, cells, scratch, &|_, _, _, _| None)
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-    fn band_avx2(&self, band: usize, rows: &mut [[f32; 4]], scratch: &mut Scratch) -> (Work, u64) {
-        self.tiles(band, rows, scratch, &|piece, depths, [x, y], work| {
+    fn band_avx2(
+        &self,
+        band: usize,
+        rows: &mut [[f32; 4]],
+        cells: &InStrip<'_>,
+        scratch: &mut Scratch,
+    ) -> (Work, u64) {
+        self.tiles(band, rows, cells, scratch, &|piece, depths, [x, y], work| {
             if !packet::suits(piece) {
                 return None;
             }
@@ -404,6 +507,7 @@ impl Picture<'_> {
         &self,
         band: usize,
         rows: &mut [[f32; 4]],
+        cells: &InStrip<'_>,
         scratch: &mut Scratch,
         eight: &impl Fn(&Placed<'_>, [f32; 2], [usize; 2], &mut Work) -> Option<[[f32; 4]; 8]>,
     ) -> (Work, u64) {
@@ -412,6 +516,13 @@ impl Picture<'_> {
         let crossings = self.surfaces.band(band, &self.rays, width, height);
         let mut shown = Vec::with_capacity(self.placed.len());
         let tall = rows.len() / width;
+        let mut spans: Vec<Spans<'_>> = Vec::with_capacity(self.grids.len());
+        let in_cells = |place: usize| {
+            self.grids
+                .iter()
+                .zip(cells.list)
+                .map(move |(grid, strip)| strip.pixel(grid, cells.before + place, self.rays.near_mm))
+        };
         for tile in 0..width.div_ceil(TILE) {
             shown.clear();
             for (piece, depths) in self.placed.iter().zip(self.depths) {
@@ -420,7 +531,7 @@ impl Picture<'_> {
                     shown.push((piece, range));
                 }
             }
-            if shown.is_empty() && self.layered.is_empty() && crossings.len() == 0 {
+            if shown.is_empty() && self.layered.is_empty() && self.grids.is_empty() && crossings.len() == 0 {
                 continue;
             }
             for block in 0..TILE * TILE / 8 {
@@ -434,7 +545,10 @@ impl Picture<'_> {
                 let places = (top..bottom).flat_map(|row| (left..right).map(move |x| row * width + x));
                 let drawn = match (&shown[..], self.layered) {
                     ([(piece, depths)], [])
-                        if is_whole && places.clone().all(|place| crossings.of(place).is_empty()) =>
+                        if is_whole
+                            && places.clone().all(|place| {
+                                crossings.of(place).is_empty() && in_cells(place).all(|s| s.is_empty())
+                            }) =>
                     {
                         eight(piece, *depths, [left, band * TILE + top], &mut work)
                     }
@@ -448,13 +562,24 @@ impl Picture<'_> {
                 }
                 for place in places {
                     let hits = crossings.of(place);
-                    if shown.is_empty() && self.layered.is_empty() && hits.is_empty() {
+                    spans.clear();
+                    spans.extend(in_cells(place).filter(|spans| !spans.is_empty()));
+                    if shown.is_empty() && self.layered.is_empty() && hits.is_empty() && spans.is_empty() {
                         continue;
                     }
                     let lens = self.rays.lens(place % width, band * TILE + place / width);
                     let ray = self.ray(lens);
-                    rows[place] =
-                        march::pixel(&shown, self.layered, hits, lens, &ray, self.manner, scratch, &mut work);
+                    rows[place] = march::pixel(
+                        &shown,
+                        self.layered,
+                        hits,
+                        &spans,
+                        lens,
+                        &ray,
+                        self.manner,
+                        scratch,
+                        &mut work,
+                    );
                 }
             }
         }

@@ -5,6 +5,12 @@ use super::light;
 use crate::scene::light::FLAT;
 use crate::volume::Transfer;
 
+/// What one panel may see change of 1 - opacity, as a ratio. This and the next are measured: see the
+/// tests of exactness.
+const RATIO: f64 = 1.2;
+/// The same of the part of a piece times the optical depth.
+const BEND: f64 = 0.005;
+
 /// One piece: values from `low` on, up to the next piece's.
 #[derive(Debug, Clone, PartialEq)]
 struct Piece {
@@ -97,6 +103,22 @@ impl Classes {
     /// Whether light may take a piece's colour past the display's range.
     pub(super) fn glares(&self, piece: usize) -> bool {
         self.pieces[piece].glares
+    }
+
+    /// The greatest extinction (1/mm) of a piece within a range of values, low and high, or `None` where it varies by more
+    /// over `length` mm than one panel of the rule follows.
+    pub(super) fn smooth(&self, piece: usize, range: [f64; 2], length: f64) -> Option<f64> {
+        if let Some(tau) = self.constant(piece) {
+            return Some(tau);
+        }
+        let [p, q] = range.map(|v| self.opacity(piece, v));
+        let (least, most) = (p.min(q), p.max(q));
+        let tau = self.extinction(most);
+        let [from, to] = range.map(|v| self.part(piece, v));
+        // The extinction is the logarithm of what is let through: its ratio tells how it bends. And the
+        // more colour and extinction change together, the higher is the degree of their product.
+        let follows = 1.0 - least <= RATIO * (1.0 - most) && (to - from) * tau * length <= BEND;
+        follows.then_some(tau)
     }
 
     /// How far into a piece a value lies, from 0 to 1; 0 where the piece is constant.

@@ -6,6 +6,7 @@
 //! processes"; Hairer, Nørsett, Wanner, "Solving ODE I", II.7): the integral up to the node of the cubic
 //! through the four values.
 
+use super::cells::Linear;
 use super::walk::Walker;
 
 /// Transmittance below which the rest of a ray cannot be seen: 2.6e-5 of 1/255.
@@ -46,6 +47,21 @@ const UP_TO: [[f64; 4]; 4] = [
     [0.177_482_572_254_522_6, 0.313_445_114_741_868_35, 0.352_676_757_516_271_86, 0.086_963_711_284_363_46],
 ];
 
+/// What a ray is in.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Meets<'a> {
+    pub(super) walkers: &'a [Walker<'a>],
+    pub(super) cells: &'a [Linear<'a>],
+}
+
+impl Meets<'_> {
+    /// Colour and extinction (1/mm) of each at `t`.
+    fn classify(&self, t: f64) -> impl Iterator<Item = ([f64; 3], f64)> {
+        let in_pieces = self.walkers.iter().filter(|w| !w.clear).map(move |w| w.classify(t));
+        in_pieces.chain(self.cells.iter().map(move |cell| cell.classify(t)))
+    }
+}
+
 /// What a ray has gathered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gathered {
@@ -67,31 +83,30 @@ impl Gathered {
         self.through *= 1.0 - opacity;
     }
 
-    /// Adds a stretch in which no walker leaves its span, in `parts` equal parts.
-    pub(super) fn stretch(&mut self, walkers: &[Walker<'_>], from: f64, to: f64, parts: u32) {
+    /// Adds a stretch in which no walker leaves its span and no cell ends, in `parts` equal parts.
+    pub(super) fn stretch(&mut self, meets: Meets<'_>, from: f64, to: f64, parts: u32) {
         let at = |i: u32| from + (to - from) * f64::from(i) / f64::from(parts);
         for i in 0..parts {
-            self.panel(walkers, at(i), if i + 1 == parts { to } else { at(i + 1) }, 0);
+            self.panel(meets, at(i), if i + 1 == parts { to } else { at(i + 1) }, 0);
         }
     }
 
-    fn panel(&mut self, walkers: &[Walker<'_>], from: f64, to: f64, halvings: u32) {
+    fn panel(&mut self, meets: Meets<'_>, from: f64, to: f64, halvings: u32) {
         let length = to - from;
         if length <= 0.0 || self.through < DARK {
             return;
         }
-        if halvings < HALVINGS && rough(walkers, from, to, halvings) {
+        if halvings < HALVINGS && rough(meets, from, to, halvings) {
             let middle = 0.5 * (from + to);
-            self.panel(walkers, from, middle, halvings + 1);
-            self.panel(walkers, middle, to, halvings + 1);
+            self.panel(meets, from, middle, halvings + 1);
+            self.panel(meets, middle, to, halvings + 1);
             return;
         }
         let mut tau = [0.0; 4];
         let mut glow = [[0.0; 3]; 4];
         for node in 0..4 {
             let t = from + length * NODES[node];
-            for walker in walkers.iter().filter(|w| !w.clear) {
-                let (color, extinction) = walker.classify(t);
+            for (color, extinction) in meets.classify(t) {
                 tau[node] += extinction;
                 for c in 0..3 {
                     glow[node][c] += extinction * color[c];
@@ -127,10 +142,12 @@ impl Gathered {
 }
 
 /// Whether a panel must be halved.
-fn rough(walkers: &[Walker<'_>], from: f64, to: f64, halvings: u32) -> bool {
+fn rough(meets: Meets<'_>, from: f64, to: f64, halvings: u32) -> bool {
+    let heed_light = halvings < HALVINGS_FOR_LIGHT;
+    let in_pieces = meets.walkers.iter().filter(|w| !w.clear).map(|w| w.smooth(from, to, heed_light));
     let mut tau = 0.0;
-    for walker in walkers.iter().filter(|w| !w.clear) {
-        let Some(most) = walker.smooth(from, to, halvings < HALVINGS_FOR_LIGHT) else { return true };
+    for most in in_pieces.chain(meets.cells.iter().map(|cell| cell.smooth(from, to))) {
+        let Some(most) = most else { return true };
         tau += most;
     }
     tau * (to - from) > DEPTH

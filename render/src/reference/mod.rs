@@ -10,9 +10,13 @@
 //!    walls, where the scalar, a cubic there, passes a control point, and where light has a bend.
 //!    `labels` adds the places where another label is the nearest.
 //! 4. `integrate`: between two such places a rule of high order, halved until it holds.
-//! 5. `modes`: volumes that are not integrated but found as layers, by the same cubics.
+//! 5. `cells`: the stretches of a ray in tetrahedra, where the scalar is linear, cut at control points.
+//! 6. `modes`: volumes that are not integrated but found as layers, by the same cubics.
 //!
-//! Unstructured grids have a page of their own, [`cells`].
+//! **Unstructured grids** (`cells`): a cell is the tetrahedra of its corner of the smallest number with every triangle of the
+//! faces that lack it, where a face of four corners is cut from its own smallest. In a tetrahedron the scalar is linear; a
+//! field of cells is the same throughout each cell. Tetrahedra of no volume, and those with a value that is not a number, are
+//! nothing. Where several overlap, extinctions add up and colours are weighted by them, as those of volumes do. No light.
 //!
 //! **Geometry** is relative to the camera's eye, so that a scene far from the origin keeps its digits.
 //! Lengths are world millimetres along the ray. Row 0 is the top one.
@@ -51,10 +55,11 @@
 //! - Butcher 1964, "Implicit Runge-Kutta processes", Mathematics of Computation 18; Hairer, Nørsett,
 //!   Wanner, "Solving Ordinary Differential Equations I", II.7.
 
-pub mod cells;
+mod cells;
 mod class;
 mod cubic;
 mod field;
+mod hierarchy;
 mod integrate;
 mod intervals;
 mod labels;
@@ -127,6 +132,12 @@ pub enum ReferenceError {
     Isosurface {
         /// Position in [`Scene::volumes`].
         volume: usize,
+    },
+    /// A grid has no such step, or the step no such field.
+    #[error("unstructured grid {grid} has no such step, or no field of that name with that component there")]
+    Grid {
+        /// Position in [`Scene::grids`].
+        grid: usize,
     },
     /// The caller said to stop.
     #[error("drawing was cancelled")]

@@ -1,7 +1,8 @@
 //! From a pixel to its colour: its ray, and the events along it in order.
 
+use super::cells::{Cells, Linear};
 use super::field::Field;
-use super::integrate::{DARK, Gathered};
+use super::integrate::{DARK, Gathered, Meets};
 use super::intervals::Intervals;
 use super::modes::Layered;
 use super::surface::{Hit, Surfaces};
@@ -19,12 +20,18 @@ pub(super) fn fields<'a>(scene: &'a Scene, options: Options) -> Vec<Option<Field
     scene.volumes.iter().map(field).collect()
 }
 
-/// Where a piece begins or ends along a ray.
+/// Where a piece, or a cell, begins or ends along a ray.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
     at: f64,
-    part: usize,
+    of: Of,
     begins: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Of {
+    Part(usize),
+    Cell(usize),
 }
 
 /// What a thread keeps from ray to ray.
@@ -41,6 +48,7 @@ pub(super) struct Tracer<'a> {
     parts: Vec<Part<'a>>,
     layered: Vec<Layered<'a>>,
     surfaces: Surfaces,
+    grids: Vec<Cells>,
     frame: CameraFrame,
     projection: Projection,
     size: [u32; 2],
@@ -68,9 +76,11 @@ impl<'a> Tracer<'a> {
                 parts.extend(item.pieces.iter().map(|piece| Part::new(field, item, piece, eye)));
             }
         }
+        let place = |(grid, item)| Cells::of(item, eye).ok_or(ReferenceError::Grid { grid });
+        let grids = scene.grids.iter().enumerate().map(place).collect::<Result<_, _>>()?;
         let surfaces = Surfaces::of(&scene.meshes, eye);
         let projection = scene.camera.projection;
-        Ok(Self { parts, layered, surfaces, frame, projection, size, cuts: options.parts.max(1) })
+        Ok(Self { parts, layered, surfaces, grids, frame, projection, size, cuts: options.parts.max(1) })
     }
 
     /// The ray of a pixel: its start relative to the eye, and its direction.
@@ -104,13 +114,22 @@ impl<'a> Tracer<'a> {
             let line = piece.line(&offset, &direction);
             piece.stretches(&line, &offset, &direction, &mut scratch.intervals);
             for &[from, to] in scratch.intervals.stretches() {
-                scratch.edges.push(Edge { at: from, part, begins: true });
-                scratch.edges.push(Edge { at: to, part, begins: false });
+                scratch.edges.push(Edge { at: from, of: Of::Part(part), begins: true });
+                scratch.edges.push(Edge { at: to, of: Of::Part(part), begins: false });
             }
+        }
+        let mut inside: Vec<Linear<'_>> = Vec::new();
+        for grid in &self.grids {
+            grid.stretches(&offset, &direction, &mut inside);
+        }
+        for (i, cell) in inside.iter().enumerate() {
+            scratch.edges.push(Edge { at: cell.from, of: Of::Cell(i), begins: true });
+            scratch.edges.push(Edge { at: cell.to, of: Of::Cell(i), begins: false });
         }
         scratch.edges.sort_unstable_by(|a, b| a.at.total_cmp(&b.at));
         let mut gathered = Gathered::START;
         let mut walkers: Vec<Walker<'_>> = Vec::new();
+        let mut cells: Vec<Linear<'_>> = Vec::new();
         let mut at = 0.0;
         let (mut edges, mut hits) = (scratch.edges.iter().peekable(), scratch.hits.iter().peekable());
         while gathered.through >= DARK {
@@ -120,18 +139,21 @@ impl<'a> Tracer<'a> {
             if next == f64::INFINITY {
                 break;
             }
-            self.march(&mut walkers, [at, next], &mut gathered);
+            self.march(&mut walkers, &cells, [at, next], &mut gathered);
             at = next;
             if next_hit <= next_edge {
                 if let Some(hit) = hits.next() {
                     gathered.surface(hit.color, hit.opacity);
                 }
             } else if let Some(edge) = edges.next() {
-                let part = &self.parts[edge.part];
-                if edge.begins {
-                    walkers.push(Walker::start(part, &offset, direction, edge.at));
-                } else {
-                    walkers.retain(|walker| !walker.is_in(part));
+                match edge.of {
+                    Of::Part(part) if edge.begins => {
+                        walkers.push(Walker::start(&self.parts[part], &offset, direction, edge.at));
+                    }
+                    Of::Part(part) => walkers.retain(|walker| !walker.is_in(&self.parts[part])),
+                    Of::Cell(i) if edge.begins => cells.push(inside[i]),
+                    // Those that end at the same place may go with it.
+                    Of::Cell(_) => cells.retain(|cell| cell.to > edge.at),
                 }
             }
         }
@@ -140,8 +162,14 @@ impl<'a> Tracer<'a> {
     }
 
     /// Along a stretch on which no piece begins or ends and no surface is.
-    fn march(&self, walkers: &mut [Walker<'_>], [from, to]: [f64; 2], gathered: &mut Gathered) {
-        if walkers.is_empty() {
+    fn march(
+        &self,
+        walkers: &mut [Walker<'_>],
+        cells: &[Linear<'_>],
+        [from, to]: [f64; 2],
+        gathered: &mut Gathered,
+    ) {
+        if walkers.is_empty() && cells.is_empty() {
             return;
         }
         let mut at = from;
@@ -153,8 +181,8 @@ impl<'a> Tracer<'a> {
                 }
                 end = end.min(walker.end);
             }
-            if walkers.iter().any(|walker| !walker.clear) {
-                gathered.stretch(walkers, at, end, self.cuts);
+            if !cells.is_empty() || walkers.iter().any(|walker| !walker.clear) {
+                gathered.stretch(Meets { walkers, cells }, at, end, self.cuts);
             }
             at = end;
         }

@@ -8,14 +8,10 @@
 //! agree on its side, and a closed mesh is crossed an even number of times. Differs from Woop et al.,
 //! who let both triangles of an edge be hit.
 
-use std::ops::Range;
-
+use super::hierarchy::{Bounded, Hierarchy};
 use super::light;
 use crate::scene::{MeshItem, Shading};
 use crate::volume::{Point, Vector};
-
-/// Triangles in a leaf of the hierarchy at most.
-const LEAF: usize = 4;
 
 /// A crossing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,26 +39,15 @@ struct Triangle {
     order: usize,
 }
 
-#[derive(Debug)]
-struct Node {
-    low: [f64; 3],
-    high: [f64; 3],
-    /// Triangles of a leaf; none for an inner node, whose first child is the next node.
-    triangles: Range<usize>,
-    /// The node after all below this one.
-    skip: usize,
-}
-
 /// All meshes of a scene, relative to the eye.
 #[derive(Debug)]
 pub(super) struct Surfaces {
-    triangles: Vec<Triangle>,
-    nodes: Vec<Node>,
+    triangles: Hierarchy<Triangle>,
     looks: Vec<([f64; 3], f64, Shading)>,
 }
 
 impl Surfaces {
-    /// Places the meshes and builds a bounding volume hierarchy. Invisible ones are left out.
+    /// Places the meshes. Invisible ones are left out.
     pub(super) fn of(meshes: &[MeshItem], eye: &Point) -> Self {
         let mut triangles = Vec::new();
         let mut order = 0;
@@ -79,46 +64,7 @@ impl Surfaces {
             }
         }
         let looks = meshes.iter().map(|item| (item.color, item.opacity, item.shading)).collect();
-        let mut surfaces = Self { triangles, nodes: Vec::new(), looks };
-        surfaces.build(0..surfaces.triangles.len());
-        surfaces
-    }
-
-    /// Adds the node of a range of triangles and all below it: halves by the median of their middles along
-    /// the longest side, down to leaves. It calls itself as deep as the number of triangles has bits.
-    fn build(&mut self, range: Range<usize>) {
-        if range.is_empty() {
-            return;
-        }
-        let (mut low, mut high) = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
-        let (mut first, mut last) = (low, high);
-        for triangle in &self.triangles[range.clone()] {
-            for corner in &triangle.corners {
-                (low, high) = (low.inf(corner), high.sup(corner));
-            }
-            let middle = triangle.corners.iter().sum::<Vector>();
-            (first, last) = (first.inf(&middle), last.sup(&middle));
-        }
-        // The hit test moves corners by rounding; boxes must not be narrower than that.
-        let pad = 1e-12 * (1.0 + low.amax().max(high.amax()));
-        let leaf = range.len() <= LEAF;
-        let node = self.nodes.len();
-        self.nodes.push(Node {
-            low: low.add_scalar(-pad).into(),
-            high: high.add_scalar(pad).into(),
-            triangles: if leaf { range.clone() } else { 0..0 },
-            skip: 0,
-        });
-        if !leaf {
-            let axis = (last - first).imax();
-            let half = range.len() / 2;
-            let middle = |t: &Triangle| t.corners.iter().map(|c| c[axis]).sum::<f64>();
-            self.triangles[range.clone()]
-                .select_nth_unstable_by(half, |a, b| middle(a).total_cmp(&middle(b)));
-            self.build(range.start..range.start + half);
-            self.build(range.start + half..range.end);
-        }
-        self.nodes[node].skip = self.nodes.len();
+        Self { triangles: Hierarchy::new(triangles), looks }
     }
 
     /// Every crossing of the ray at or after its start, sorted by distance; at one distance in the order
@@ -126,50 +72,25 @@ impl Surfaces {
     /// vector.
     pub(super) fn hits(&self, offset: &Vector, direction: &Vector, into: &mut Vec<Hit>) {
         into.clear();
-        if self.nodes.is_empty() {
-            return;
-        }
         let shear = Shear::along(direction);
-        let inverse = direction.map(|d| 1.0 / d);
-        let mut i = 0;
-        while let Some(node) = self.nodes.get(i) {
-            if !node.is_met(offset, &inverse) {
-                i = node.skip;
-                continue;
+        for triangle in self.triangles.near(offset, direction) {
+            let Some(at) = shear.hit(&triangle.corners.map(|c| c - offset)) else { continue };
+            if at >= 0.0 {
+                let (color, opacity, shading) = self.looks[triangle.mesh];
+                let color = match shading {
+                    Shading::None => color,
+                    Shading::Lit => light::lit(color, triangle.facing(direction)),
+                };
+                into.push(Hit { at, color, opacity, triangle: triangle.order });
             }
-            for triangle in &self.triangles[node.triangles.clone()] {
-                let Some(at) = shear.hit(&triangle.corners.map(|c| c - offset)) else { continue };
-                if at >= 0.0 {
-                    let (color, opacity, shading) = self.looks[triangle.mesh];
-                    let color = match shading {
-                        Shading::None => color,
-                        Shading::Lit => light::lit(color, triangle.facing(direction)),
-                    };
-                    into.push(Hit { at, color, opacity, triangle: triangle.order });
-                }
-            }
-            i += 1;
         }
         into.sort_unstable_by(|a, b| a.at.total_cmp(&b.at).then(a.triangle.cmp(&b.triangle)));
     }
 }
 
-impl Node {
-    fn is_met(&self, offset: &Vector, inverse: &Vector) -> bool {
-        let (mut from, mut to) = (0.0_f64, f64::INFINITY);
-        for axis in 0..3 {
-            let (low, high) = (self.low[axis] - offset[axis], self.high[axis] - offset[axis]);
-            if inverse[axis].is_infinite() {
-                if low > 0.0 || high < 0.0 {
-                    return false;
-                }
-                continue;
-            }
-            let (a, b) = (low * inverse[axis], high * inverse[axis]);
-            from = from.max(a.min(b));
-            to = to.min(a.max(b));
-        }
-        from <= to * (1.0 + 1e-12)
+impl Bounded for Triangle {
+    fn corners(&self) -> &[Vector] {
+        &self.corners
     }
 }
 

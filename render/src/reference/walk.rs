@@ -291,23 +291,6 @@ impl<'a> Walker<'a> {
         if self.lit && heed_light && !self.light_is_smooth(a, b) {
             return None;
         }
-        if let Some(tau) = classes.constant(self.class) {
-            return Some(tau);
-        }
-        let range = self.value.bounds(a, b);
-        let [p, q] = range.map(|v| classes.opacity(self.class, v));
-        let (least, most) = (p.min(q), p.max(q));
-        let tau = classes.extinction(most);
-        let [from, to] = range.map(|v| classes.part(self.class, v));
-        // The extinction is the logarithm of what is let through: its ratio tells how it bends. And the
-        // more colour and extinction change together, the higher is the degree of their product.
-        let follows = 1.0 - least <= RATIO * (1.0 - most) && (to - from) * tau * (b - a) <= BEND;
-        follows.then_some(tau)
+        classes.smooth(self.class, self.value.bounds(a, b), b - a)
     }
 }
-
-/// What one panel may see change of 1 - opacity, as a ratio. This and the next are measured: see the
-/// tests of exactness.
-const RATIO: f64 = 1.2;
-/// The same of the part of a class times the optical depth.
-const BEND: f64 = 0.005;

@@ -5,7 +5,7 @@ use render::volume::Affine;
 
 use super::{Edit, EditError, fragments};
 use crate::case::labels::{self, LabelSet};
-use crate::case::{Case, Fragment, Implant, NamedCutter, Volume};
+use crate::case::{Case, Fragment, Implant, NamedCutter, Volume, grids};
 
 /// Applies a change, or leaves the case as it was.
 ///
@@ -92,7 +92,12 @@ pub fn apply(case: &mut Case, edit: Edit) -> Result<(), EditError> {
             fragments::split_volume(case, &volume, &cutters, &corners)?;
         }
         Edit::SplitFragment { id, cutter, corners } => fragments::split(case, &id, &cutter, &corners)?,
-        Edit::Fuse { ids, corners } => fragments::fuse(case, &ids, &corners)?,
+        Edit::Fuse { ids, corners } => {
+            fragments::fuse(case, &ids, &corners)?;
+            if let Some((first, others)) = ids.split_first() {
+                others.iter().for_each(|other| grids::follow(case, other, first));
+            }
+        }
         Edit::Unsplit { volume } => {
             volume_mut(case, &volume)?;
             case.fragments.retain(|f| f.volume != volume);
@@ -115,12 +120,16 @@ pub fn apply(case: &mut Case, edit: Edit) -> Result<(), EditError> {
         }
         Edit::RenameFragment { id, to } => {
             new_id("fragment", &to, id != to && case.fragment(&to).is_some())?;
-            fragment_mut(case, &id)?.id = to;
+            fragment_mut(case, &id)?.id.clone_from(&to);
+            grids::follow(case, &id, &to);
         }
         Edit::SetFragmentPose { id, pose } => fragment_mut(case, &id)?.pose = rigid(&id, pose)?,
         Edit::SetFragmentVisible { id, visible } => fragment_mut(case, &id)?.visible = visible,
+        Edit::AddGrid(grid) => grids::add(case, *grid)?,
+        Edit::ChangeGrid { id, change } => grids::apply(case, &id, change)?,
         other => apply_to_labels(case, other)?,
     }
+    grids::let_go(case);
     Ok(())
 }
 

@@ -7,12 +7,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use ::render::cells::{
-    Breaks, CellItem, CellPicture, CellRenderer, Counts, Early, Engine, Options, Part, Scalar, Spread,
-};
-use ::render::reference::cells::{CellField, draw_pixels};
-use ::render::scene::{Camera, Projection};
-use ::render::volume::cells::{CellGrid, CellKind, Field, Place, Step, Values};
+use ::render::cells::{Breaks, CellPicture, CellRenderer, Counts, Early, Engine, Options, Spread};
+use ::render::reference;
+use ::render::scene::{Camera, CellItem, Projection, Scene};
+use ::render::volume::cells::{CellGrid, CellKind, Field, Step, Values};
 use ::render::volume::{Affine, ControlPoint, Point, Transfer, Vector};
 use serde_json::json;
 
@@ -47,8 +45,10 @@ pub(super) fn run(data: Option<&Path>, bench: &mut Bench) -> Result<(), Failure>
         Some(path) => read(path)?,
         None => ball(41)?,
     };
-    let (field, scalar) = shown(&grid)?;
-    let range = field.range(0).unwrap_or([0.0, 1.0]);
+    let scalar = grid.first_scalar();
+    let scalar =
+        scalar.ok_or_else(|| Failure::Unfit("the grid has no field; choose another file".to_owned()))?;
+    let range = scalar.range(&grid).unwrap_or([0.0, 1.0]);
     let mut renderer = CellRenderer::new();
     for (opacity, dense) in [("thin", false), ("dense", true)] {
         let item = CellItem {
@@ -135,14 +135,14 @@ fn error(item: &CellItem, camera: &Camera, picture: &CellPicture) -> Result<f64,
     let size = [picture.image.width, picture.image.height];
     let pixels: Vec<(u32, u32)> =
         (0..size[0] * size[1]).step_by(COMPARED).map(|i| (i % size[0], i / size[0])).collect();
-    let Some(field) = item.grid.steps()[item.step].field(item.scalar.place, &item.scalar.name) else {
-        return Ok(f64::NAN);
+    let scene = Scene {
+        volumes: Vec::new(),
+        meshes: Vec::new(),
+        grids: vec![item.clone()],
+        camera: *camera,
+        background: [0.0; 3],
     };
-    let tuples = field.values().len() / field.components().max(1);
-    let values: Vec<f64> = (0..tuples).map(|tuple| item.scalar.part.of(field, tuple)).collect();
-    let (pose, place, transfer) = (item.pose, item.scalar.place, &*item.transfer);
-    let field = CellField { grid: &item.grid, pose, place, values: &values, transfer };
-    let known = draw_pixels(&field, camera, size, &pixels)?;
+    let known = reference::draw_pixels(&scene, size, &reference::Options::default(), &pixels)?;
     let apart = pixels.iter().zip(known).flat_map(|(&(x, y), known)| {
         let found = picture.image.pixels[(y * size[0] + x) as usize];
         [0, 1, 2, 3].map(|c| (f64::from(found[c]) - known[c]).abs() * 255.0)
@@ -158,20 +158,6 @@ fn read(path: &Path) -> Result<Arc<CellGrid>, Failure> {
     });
     let fault = "there is no unstructured grid in it; choose a VTU, VTK or Exodus file";
     grid.ok_or_else(|| Failure::Unfit(format!("{fault}: {}", path.display())))
-}
-
-/// The first scalar of a grid's points, or the first of its cells; a vector by its length.
-fn shown(grid: &CellGrid) -> Result<(&Field, Scalar), Failure> {
-    let step = grid.steps().first();
-    let places = [Place::Points, Place::Cells];
-    let fields = places.iter().flat_map(|&place| {
-        step.into_iter().flat_map(move |step| step.fields(place)).map(move |field| (place, field))
-    });
-    let first = fields.min_by_key(|(_, field)| field.components() != 1);
-    let (place, field) =
-        first.ok_or_else(|| Failure::Unfit("the grid has no field; choose another file".to_owned()))?;
-    let part = if field.components() == 1 { Part::Component(0) } else { Part::Magnitude };
-    Ok((field, Scalar { place, name: field.name().to_owned(), part }))
 }
 
 /// Along the longest side of the grid, or across it with that side lying.

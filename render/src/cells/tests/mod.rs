@@ -8,10 +8,10 @@ mod same;
 use std::sync::Arc;
 
 use super::*;
-use crate::reference::cells::{CellField, draw_pixels};
-use crate::scene::Projection;
-use crate::volume::cells::{CellKind, Step, Values};
-use crate::volume::{ControlPoint, Point, Vector};
+use crate::reference::{self, draw_pixels};
+use crate::scene::{Projection, Scene};
+use crate::volume::cells::{CellKind, Field, Part, Place, Step, Values};
+use crate::volume::{Affine, ControlPoint, Point, Transfer, Vector};
 
 /// Numbers from 0 to 1 without order.
 pub(super) struct Dice(u64);
@@ -137,19 +137,15 @@ pub(super) fn off(
     every: u32,
     picture: &CellPicture,
 ) -> (f64, usize) {
-    let step = &item.grid.steps()[item.step];
-    let field = step.field(item.scalar.place, &item.scalar.name).expect("a field");
-    let tuples = field.values().len() / field.components();
-    let values: Vec<f64> = (0..tuples).map(|n| item.scalar.part.of(field, n)).collect();
-    let known = CellField {
-        grid: &item.grid,
-        pose: item.pose,
-        place: item.scalar.place,
-        values: &values,
-        transfer: &item.transfer,
+    let scene = Scene {
+        volumes: Vec::new(),
+        meshes: Vec::new(),
+        grids: vec![item.clone()],
+        camera: *camera,
+        background: [0.0; 3],
     };
     let pixels = some_pixels(size, every);
-    let known = draw_pixels(&known, camera, size, &pixels).expect("pixels");
+    let known = draw_pixels(&scene, size, &reference::Options::default(), &pixels).expect("pixels");
     let mut most = 0.0_f64;
     for (&(x, y), known) in pixels.iter().zip(&known) {
         let found = picture.image.pixels[(y * size[0] + x) as usize];

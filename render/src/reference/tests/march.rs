@@ -2,8 +2,10 @@
 //! grid, the transfer function and the cutters themselves at every step.
 
 use super::*;
+use crate::scene::CellItem;
 use crate::scene::light::{AMBIENT, DIFFUSE, FLAT, SHININESS, SPECULAR};
-use crate::volume::{Cutter, Side};
+use crate::volume::cells::{CellKind, Field, Part, Place, Scalar, Step, Values};
+use crate::volume::{CellGrid, Cutter, Side};
 
 fn lit(color: [f64; 3], facing: f64) -> [f64; 3] {
     color.map(|c| (c * (AMBIENT + DIFFUSE * facing) + SPECULAR * facing.powf(SHININESS)).clamp(0.0, 1.0))
@@ -35,6 +37,25 @@ fn at(item: &VolumeItem, piece: &Piece, p: &Point, direction: &Vector) -> Option
     let span = points[points.len() - 1].value - points[0].value;
     let steep = gradient.norm() >= FLAT * span && gradient.norm() > 0.0;
     Some((if steep { lit(color, gradient.normalize().dot(direction).abs()) } else { color }, tau))
+}
+
+/// Colour and extinction of each tetrahedron of a grid at a place, by Cramer's rule.
+fn in_cells(item: &CellItem, p: &Point) -> Vec<([f64; 3], f64)> {
+    let field = item.scalar.field(&item.grid.steps()[item.step]).expect("a field");
+    let mut found = Vec::new();
+    for cell in 0..item.grid.len() {
+        let corners: [u32; 4] = item.grid.cell(cell).1.try_into().expect("a tetrahedron");
+        let [a, b, c, d] = corners.map(|n| item.pose.point(&item.grid.points()[n as usize]));
+        let matrix = nalgebra::Matrix3::from_columns(&[b - a, c - a, d - a]);
+        let w = matrix.try_inverse().expect("a volume") * (p - a);
+        let weights = [1.0 - w.sum(), w.x, w.y, w.z];
+        if weights.iter().all(|w| *w >= 0.0) {
+            let values = corners.map(|n| field.value(n as usize, 0));
+            let value = weights.iter().zip(values).map(|(w, v)| w * v).sum::<f64>();
+            found.push(item.transfer.classify(value));
+        }
+    }
+    found
 }
 
 /// Every crossing of the ray with a triangle, by Cramer's rule.
@@ -84,6 +105,12 @@ fn march(scene: &Scene, (start, direction): (Point, Vector), [from, to]: [f64; 2
                 }
             }
         }
+        for (color, extinction) in scene.grids.iter().flat_map(|item| in_cells(item, &p)) {
+            tau += extinction;
+            for c in 0..3 {
+                glow[c] += extinction * color[c];
+            }
+        }
         if tau > 0.0 {
             add(glow.map(|g| g / tau), 1.0 - (-tau * step).exp());
         }
@@ -94,8 +121,32 @@ fn march(scene: &Scene, (start, direction): (Point, Vector), [from, to]: [f64; 2
     pixel
 }
 
+/// Five tetrahedra that make a cube, askew, among the volumes, and one that overlaps them.
+fn grid() -> CellItem {
+    let corner = |i: usize| [0, 1, 2].map(|a| if i >> a & 1 == 1 { 3.0 } else { -3.5 });
+    let mut points: Vec<Point> = (0..8).map(|i| Point::from(corner(i))).collect();
+    points.push(Point::new(1.0, 0.5, 6.0));
+    let cells = [[0, 1, 2, 4], [3, 1, 2, 7], [5, 1, 4, 7], [6, 2, 4, 7], [1, 2, 4, 7], [0, 1, 2, 8]];
+    let values = vec![0.0, 9.0, 3.0, 7.0, 1.0, 8.0, 2.0, 4.0, 6.0];
+    let field = Field::new("s".to_owned(), 1, Values::F64(values));
+    let steps = vec![Step { time: 0.0, point_fields: vec![field], cell_fields: Vec::new() }];
+    let kinds = vec![CellKind::Tetra; cells.len()];
+    CellItem {
+        grid: Arc::new(CellGrid::new(points, kinds, cells.concat(), steps).expect("a grid")),
+        step: 0,
+        scalar: Scalar { place: Place::Points, name: "s".to_owned(), part: Part::Component(0) },
+        pose: Affine::rotation_about(Point::origin(), Vector::new(0.3, 1.0, 0.2), 0.4),
+        transfer: transfer(&[
+            point(1.0, [0.9, 0.2, 0.1, 0.0]),
+            point(4.0, [0.2, 0.9, 0.4, 0.2]),
+            point(4.0, [0.2, 0.1, 0.9, 0.05]),
+            point(8.0, [0.9, 0.9, 0.1, 0.3]),
+        ]),
+    }
+}
+
 /// Two volumes with their own poses that overlap, one of them lit and in three pieces, one of which is
-/// turned, and two surfaces that cross.
+/// turned, a grid among them, and two surfaces that cross.
 fn everything() -> Scene {
     let mut first = volume(noisy([13, 12, 9]), steep());
     first.shading = Shading::Lit;
@@ -129,7 +180,10 @@ fn everything() -> Scene {
     let other =
         quad(Point::new(0.0, 1.0, 0.0), Vector::new(5.0, -3.0, 1.0), Vector::z() * 7.0, [0.1, 0.9, 0.1], 0.3);
     let eye = Point::new(19.0, -21.0, 8.0);
-    scene(vec![first, second], vec![sheet, other], perspective(eye, Point::new(0.0, 0.0, 0.0)))
+    let mut scene =
+        scene(vec![first, second], vec![sheet, other], perspective(eye, Point::new(0.0, 0.0, 0.0)));
+    scene.grids = vec![grid()];
+    scene
 }
 
 #[test]

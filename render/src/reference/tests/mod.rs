@@ -83,7 +83,7 @@ fn parallel(eye: Point, target: Point, height_mm: f64) -> Camera {
 }
 
 fn scene(volumes: Vec<VolumeItem>, meshes: Vec<MeshItem>, camera: Camera) -> Scene {
-    Scene { volumes, meshes, camera, background: [0.0; 3] }
+    Scene { volumes, meshes, grids: Vec::new(), camera, background: [0.0; 3] }
 }
 
 /// Two triangles about `centre`, spanned by `a` and `b` to either side.

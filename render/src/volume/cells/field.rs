@@ -47,6 +47,7 @@ pub struct Field {
     components: usize,
     values: Values,
     ranges: Vec<Option<[f64; 2]>>,
+    lengths: Option<[f64; 2]>,
     non_finite: usize,
 }
 
@@ -64,7 +65,11 @@ impl Field {
                 *range = Some([low.min(value), high.max(value)]);
             }
         }
-        Self { name, components, values, ranges, non_finite }
+        let mut field = Self { name, components, values, ranges, lengths: None, non_finite };
+        let tuples = field.values.len().checked_div(components).unwrap_or(0);
+        let lengths = (0..tuples).map(|tuple| field.magnitude(tuple)).filter(|v| v.is_finite());
+        field.lengths = lengths.map(|v| [v; 2]).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
+        field
     }
 
     /// What the file calls it.
@@ -95,6 +100,11 @@ impl Field {
     /// Least and greatest finite value of a component; nothing where there is none.
     pub fn range(&self, component: usize) -> Option<[f64; 2]> {
         self.ranges.get(component).copied().flatten()
+    }
+
+    /// Least and greatest finite length of a tuple; nothing where there is none.
+    pub fn length_range(&self) -> Option<[f64; 2]> {
+        self.lengths
     }
 
     /// How many values are NaN or infinite.

@@ -7,8 +7,10 @@
 //! Source: VTK User's Guide, 11th ed., "VTK file formats", figure 2 (linear cell types).
 
 mod field;
+mod scalar;
 
 pub use field::{Field, Values};
+pub use scalar::{Part, Scalar};
 
 use thiserror::Error;
 

@@ -218,5 +218,5 @@ fn scene(
     };
     let eye = Point::new(0.0, -EYE_MM, 0.0);
     let camera = Camera { eye, target: Point::origin(), up: Vector::z(), projection };
-    Ok(Scene { volumes: vec![volume], meshes: Vec::new(), camera, background: [0.0; 3] })
+    Ok(Scene { volumes: vec![volume], meshes: Vec::new(), grids: Vec::new(), camera, background: [0.0; 3] })
 }

@@ -1,0 +1,239 @@
+//! A grid among volumes and surfaces: what each ray of some rows of the picture has of its cells, in order of depth, for a
+//! renderer that walks rays and adds up whatever they meet.
+//!
+//! The picture is divided, not the grid: every thread scan-converts the cells before its own rows. Nothing is merged
+//! before the ray is walked, so that a volume between or within cells needs no slices.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::CellsError;
+use super::clusters::{Clusters, Scalars};
+use super::lens::Lens;
+use super::project::{Breaks, Frame, Projector};
+use super::scan::{Raw, Rect};
+use super::stats::Counts;
+use super::table::{Place, Table};
+use crate::scene::CellItem;
+use crate::view::View;
+
+/// A grid before the camera.
+#[derive(Debug)]
+pub(crate) struct Placed {
+    clusters: Arc<Clusters>,
+    scalars: Arc<Scalars>,
+    table: Table,
+    lens: Lens,
+    size: [u32; 2],
+    skip_clear: bool,
+    wide: bool,
+    /// The pixels that each cluster may show in.
+    reaches: Vec<Rect>,
+}
+
+impl Placed {
+    pub(super) fn new(
+        (clusters, scalars): (Arc<Clusters>, Arc<Scalars>),
+        item: &CellItem,
+        view: &View,
+        skip_clear: bool,
+        wide: bool,
+    ) -> Self {
+        let (table, lens) = (Table::new(&item.transfer), Lens::new(view, &item.pose));
+        let reaches = Vec::new();
+        let mut placed = Self { clusters, scalars, table, lens, size: view.size, skip_clear, wide, reaches };
+        let frame = placed.frame();
+        let reaches = (0..placed.clusters.len()).map(|cluster| frame.reach(cluster).0).collect();
+        placed.reaches = reaches;
+        placed
+    }
+
+    /// How many tetrahedra the grid has.
+    pub(crate) fn tetrahedra(&self) -> u64 {
+        (0..self.clusters.len()).map(|cluster| self.clusters.count(cluster) as u64).sum()
+    }
+
+    fn frame(&self) -> Frame<'_> {
+        Frame {
+            clusters: &self.clusters,
+            scalars: &self.scalars,
+            table: &self.table,
+            lens: self.lens,
+            size: self.size,
+            breaks: Breaks::default(),
+            skip_clear: self.skip_clear,
+            wide: self.wide,
+        }
+    }
+}
+
+/// What the rays of some rows have of a grid; kept from strip to strip.
+#[derive(Debug, Default)]
+pub(crate) struct Strip {
+    projector: Projector,
+    /// Work since it was made.
+    pub(crate) counts: Counts,
+}
+
+impl Strip {
+    /// Finds what the rays of `rows` have of a grid.
+    pub(crate) fn fill(&mut self, placed: &Placed, rows: Range<usize>) {
+        let [width, height] = placed.size.map(|n| i32::try_from(n).unwrap_or(i32::MAX));
+        let row = |y: usize| i32::try_from(y).unwrap_or(height).min(height);
+        let rect = Rect { low: [0, row(rows.start)], high: [width, row(rows.end)] };
+        let near = placed.reaches.iter().enumerate().filter(|(_, reach)| !reach.meet(&rect).is_empty());
+        let clusters = near.map(|(cluster, _)| cluster);
+        self.projector.gather(&placed.frame(), &rect, clusters, &mut self.counts);
+    }
+
+    /// What the ray of a pixel has of the grid; pixels count from the first row, row by row. `near_mm` is the depth that
+    /// zeta counts from.
+    #[inline(always)]
+    pub(crate) fn pixel<'a>(&'a self, placed: &'a Placed, pixel: usize, near_mm: f64) -> Spans<'a> {
+        Spans { list: self.projector.gathered(pixel), table: &placed.table, near_mm }
+    }
+}
+
+/// What a ray has of a grid, nearest first.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spans<'a> {
+    list: &'a [Raw],
+    table: &'a Table,
+    near_mm: f64,
+}
+
+impl<'a> Spans<'a> {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    fn zeta(&self, depth: f64) -> f32 {
+        (depth - self.near_mm) as f32
+    }
+
+    /// Zeta where it begins and ends.
+    pub(crate) fn ends(&self) -> [f32; 2] {
+        let first = self.list.first().map_or(0.0, |raw| raw.front);
+        [first, self.list.iter().fold(first, |far, raw| far.max(raw.back))].map(|depth| self.zeta(depth))
+    }
+
+    pub(crate) fn walker(self) -> Walker<'a> {
+        Walker { spans: self, next: 0, open: Vec::new() }
+    }
+}
+
+/// A cell that the ray is in.
+#[derive(Debug, Clone, Copy)]
+struct Open {
+    front: f32,
+    back: f32,
+    values: [f32; 2],
+    /// The last place looked up.
+    place: Place,
+}
+
+impl Open {
+    /// From one zeta within the cell to another.
+    #[inline(always)]
+    fn places(&mut self, table: &Table, [from, to]: [f32; 2]) -> [Place; 2] {
+        let at = |zeta: f32| {
+            let part = ((zeta - self.front) / (self.back - self.front)).clamp(0.0, 1.0);
+            self.values[0] + (self.values[1] - self.values[0]) * part
+        };
+        let [a, b] = [at(from), at(to)];
+        let begin = if a == Table::position_of(&self.place) {
+            self.place
+        } else {
+            table.find(a, Table::piece(&self.place))
+        };
+        let end = if a == b { begin } else { table.find(b, Table::piece(&begin)) };
+        self.place = end;
+        [begin, end]
+    }
+}
+
+/// A way along a ray through the cells of a grid.
+#[derive(Debug)]
+pub(crate) struct Walker<'a> {
+    spans: Spans<'a>,
+    next: usize,
+    open: Vec<Open>,
+}
+
+impl Walker<'_> {
+    /// On to a zeta, which does not fall.
+    pub(crate) fn reach(&mut self, zeta: f32) {
+        let mut place = *self.spans.table.start();
+        self.open.retain(|open| {
+            let stays = open.back > zeta;
+            if !stays {
+                place = open.place;
+            }
+            stays
+        });
+        while let Some(raw) = self.spans.list.get(self.next) {
+            let [front, back] = [raw.front, raw.back].map(|depth| self.spans.zeta(depth));
+            if front > zeta {
+                break;
+            }
+            self.next += 1;
+            if back > zeta {
+                self.open.push(Open { front, back, values: raw.values, place });
+            }
+        }
+    }
+
+    /// Whether the ray is in no cell.
+    pub(crate) fn is_clear(&self) -> bool {
+        self.open.is_empty()
+    }
+
+    /// Whether the ray is in more than one cell.
+    pub(crate) fn is_many(&self) -> bool {
+        self.open.len() > 1
+    }
+
+    /// Where the next cell begins or one ends.
+    pub(crate) fn next_bend(&self) -> f32 {
+        let next = self.spans.list.get(self.next).map_or(f32::INFINITY, |raw| self.spans.zeta(raw.front));
+        self.open.iter().fold(next, |nearest, open| nearest.min(open.back))
+    }
+
+    /// Optical depth times colour, and optical depth, between two places before the next bend.
+    pub(crate) fn step(&mut self, range: [f32; 2], mm_per_zeta: f32) -> [f32; 4] {
+        let mut sum = [0.0; 4];
+        let table = self.spans.table;
+        for open in &mut self.open {
+            let [from, to] = open.places(table, range);
+            let depth = table.depth(&from, &to, (range[1] - range[0]) * mm_per_zeta);
+            sum = std::array::from_fn(|c| sum[c] + depth[c].max(0.0));
+        }
+        sum
+    }
+
+    /// Colour, premultiplied, and opacity between two places before the next bend, of the one cell that the ray is in.
+    pub(crate) fn segment(&mut self, range: [f32; 2], mm_per_zeta: f32) -> [f32; 4] {
+        let table = self.spans.table;
+        let Some(open) = self.open.first_mut() else { return [0.0; 4] };
+        let [from, to] = open.places(table, range);
+        table.segment(&from, &to, (range[1] - range[0]) * mm_per_zeta)
+    }
+}
+
+impl super::CellRenderer {
+    /// Makes grids ready to be drawn among other things. Clear cells may be left out.
+    ///
+    /// # Errors
+    /// [`CellsError::Step`] and [`CellsError::Field`].
+    pub(crate) fn place(
+        &mut self,
+        items: &[CellItem],
+        view: &View,
+        skip_clear: bool,
+        wide: bool,
+    ) -> Result<Vec<Placed>, CellsError> {
+        let ready = self.prepare(items)?;
+        let placed = items.iter().zip(ready);
+        Ok(placed.map(|(item, ready)| Placed::new(ready, item, view, skip_clear, wide)).collect())
+    }
+}
