@@ -27,7 +27,6 @@ const PIECE: usize = 1 << 20;
 ///
 /// Draws what [`CellRenderer`] draws: without early termination, the same bytes. The others have only their part of the grid
 /// that was drawn last. When this is dropped they are told that there is no more to do.
-#[derive(Debug)]
 pub struct Group<L: Link> {
     desk: Desk<L>,
     renderer: CellRenderer,
@@ -100,6 +99,12 @@ impl<L: Link> Group<L> {
                 Err(error)
             }
         }
+    }
+}
+
+impl<L: Link> std::fmt::Debug for Group<L> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Group").field("size", &self.size()).field("lost", &self.lost).finish_non_exhaustive()
     }
 }
 

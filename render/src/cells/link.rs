@@ -64,6 +64,28 @@ pub trait Link {
     fn wait(&mut self) -> Result<(), LinkError>;
 }
 
+impl<L: Link + ?Sized> Link for Box<L> {
+    fn rank(&self) -> usize {
+        (**self).rank()
+    }
+
+    fn size(&self) -> usize {
+        (**self).size()
+    }
+
+    fn send(&mut self, to: usize, message: Vec<u8>) -> Result<(), LinkError> {
+        (**self).send(to, message)
+    }
+
+    fn poll(&mut self) -> Result<Option<(usize, Vec<u8>)>, LinkError> {
+        (**self).poll()
+    }
+
+    fn wait(&mut self) -> Result<(), LinkError> {
+        (**self).wait()
+    }
+}
+
 #[derive(Debug, Default)]
 struct Inbox {
     messages: VecDeque<(usize, Vec<u8>)>,

@@ -42,7 +42,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use crate::cells::{self, Breaks, CellRenderer, CellsError, Early, Spans, Strip};
+use crate::cells::{self, Breaks, CellPicture, CellRenderer, CellsError, Early, Group, Link, Spans, Strip};
 use crate::image::FloatImage;
 use crate::renderer::{Quality, Stats};
 use crate::scene::{CameraError, CellItem, Scene, TextureFormat, VolumeItem, VolumeMode};
@@ -162,6 +162,27 @@ pub fn alone_shows(scene: &Scene) -> bool {
         || scene.volumes.iter().any(|item| item.mode != VolumeMode::Composite || item.labels.is_some())
 }
 
+/// The grid of a scene that has nothing else.
+fn grid_alone(scene: &Scene) -> Option<&CellItem> {
+    match (&scene.volumes[..], &scene.meshes[..], &scene.grids[..]) {
+        ([], [], [grid]) => Some(grid),
+        _ => None,
+    }
+}
+
+fn picture_of_grid(drawn: CellPicture) -> (FloatImage, Stats) {
+    let cells = drawn.stats;
+    let stats = Stats {
+        frame_ms: cells.prepare_ms + cells.frame_ms,
+        prepare_ms: cells.prepare_ms,
+        tetrahedra: cells.tetrahedra,
+        tetrahedra_scanned: cells.total.scanned,
+        grid: Some(cells),
+        ..Stats::default()
+    };
+    (drawn.image, stats)
+}
+
 /// Draws scenes. Keeps what it knows of volumes from picture to picture.
 #[derive(Debug, Default)]
 pub struct CpuRenderer {
@@ -207,8 +228,11 @@ impl CpuRenderer {
         quality: Quality,
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> Result<(FloatImage, Stats), CpuError> {
-        if let ([], [], [grid]) = (&scene.volumes[..], &scene.meshes[..], &scene.grids[..]) {
-            return self.grid_alone(grid, scene, size, quality, progress);
+        if let Some(grid) = grid_alone(scene) {
+            let options = self.of_grids(quality);
+            let breaks = Breaks::default();
+            let drawn = self.cells.render(grid, &scene.camera, size, &options, breaks, progress)?;
+            return Ok(picture_of_grid(drawn));
         }
         let begin = Instant::now();
         let [width, height] = size;
@@ -288,33 +312,35 @@ impl CpuRenderer {
         Ok((FloatImage { width, height, pixels }, stats))
     }
 
-    /// A scene of one grid and nothing else.
-    fn grid_alone(
+    /// Draws as [`CpuRenderer::render`] does, but an unstructured grid that is alone in the scene by all processes of a group.
+    /// What else there is, is drawn by this process.
+    ///
+    /// # Errors
+    /// All of [`CpuError`].
+    pub fn render_by<L: Link>(
         &mut self,
-        grid: &CellItem,
+        group: &mut Group<L>,
         scene: &Scene,
         size: [u32; 2],
         quality: Quality,
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> Result<(FloatImage, Stats), CpuError> {
+        let Some(grid) = grid_alone(scene) else { return self.render(scene, size, quality, progress) };
+        let options = self.of_grids(quality);
+        let drawn = group.render(grid, &scene.camera, size, &options, Breaks::default(), progress)?;
+        Ok(picture_of_grid(drawn))
+    }
+
+    /// How a grid that is alone is drawn.
+    fn of_grids(&self, quality: Quality) -> cells::Options {
         let dark = f64::from(self.dark(quality));
         let ends_early = quality == Quality::Draft && dark > 0.0;
-        let options = cells::Options {
+        cells::Options {
             early: ends_early.then(|| Early { threshold: 1.0 - dark, ..Early::default() }),
             skip_clear: self.skips.empty,
             wide: self.instructions == Instructions::Best,
             ..cells::Options::default()
-        };
-        let drawn = self.cells.render(grid, &scene.camera, size, &options, Breaks::default(), progress)?;
-        let cells = &drawn.stats;
-        let stats = Stats {
-            frame_ms: cells.prepare_ms + cells.frame_ms,
-            prepare_ms: cells.prepare_ms,
-            tetrahedra: cells.tetrahedra,
-            tetrahedra_scanned: cells.total.scanned,
-            ..Stats::default()
-        };
-        Ok((drawn.image, stats))
+        }
     }
 
     /// What may be left out behind a pixel falls with the error of the steps, which goes with their square.
