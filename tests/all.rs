@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail loudly")]
 
 mod bad_files;
+mod grids;
 mod headless;
 mod layering;
 mod loading;

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use render::cells::{Faults, faults};
 use render::volume::cells::Place;
 use render::volume::{CellGrid, Point, TriangleMesh};
 
@@ -154,7 +155,7 @@ pub(super) fn tell_left_out(dropped: usize, bent: usize, notes: &mut Vec<Note>) 
     }
 }
 
-/// The item of a grid, with notes on its unit and on values that are not finite.
+/// The item of a grid, with notes on its unit, on values that are not finite and on cells at fault.
 pub(super) fn grid_item(name: String, format: &'static str, grid: CellGrid, mut notes: Vec<Note>) -> Item {
     doubt_unit(grid.bounds(), "save its points in millimetres", &mut notes);
     let fields =
@@ -164,7 +165,27 @@ pub(super) fn grid_item(name: String, format: &'static str, grid: CellGrid, mut 
         notes.push(Note {
             severity: Severity::Caution,
             code: "cells.not-finite",
-            text: format!("{count} values of its fields are NaN or infinite; they count as no value."),
+            text: format!(
+                "{count} values of its fields are NaN or infinite; cells with such a value are not drawn."
+            ),
+        });
+    }
+    let Faults { flat, inverted } = faults(&grid);
+    if flat > 0 {
+        notes.push(Note {
+            severity: Severity::Caution,
+            code: "cells.flat",
+            text: format!("{flat} tetrahedra of its cells have no volume; they are not drawn."),
+        });
+    }
+    if inverted > 0 {
+        notes.push(Note {
+            severity: Severity::Caution,
+            code: "cells.inverted",
+            text: format!(
+                "{inverted} of its {} cells are turned inside out; they are drawn as they lie.",
+                grid.len()
+            ),
         });
     }
     Item { name, format, modality: None, content: Content::Cells(grid), notes }

@@ -24,6 +24,13 @@ pub struct Faults {
     pub inverted: u64,
 }
 
+/// What is wrong with the cells of a grid.
+pub fn faults(grid: &CellGrid) -> Faults {
+    let mut faults = Faults::default();
+    parts(grid, &mut faults);
+    faults
+}
+
 /// Cells of a grid, ready to be drawn from anywhere.
 #[derive(Debug)]
 pub(super) struct Clusters {

@@ -52,7 +52,7 @@ mod wire;
 mod worker;
 
 pub(crate) use among::{Placed, Spans, Strip, Walker};
-pub use clusters::Faults;
+pub use clusters::{Faults, faults};
 pub use early::Early;
 pub use engine::Engine;
 pub use fold::Segment;

@@ -2,7 +2,7 @@
 //!
 //! The mean of extinction, and of extinction times colour, between two values is the difference of their antiderivatives
 //! over that of the values (pre-integration with tables of one dimension, Engel 2001). The function is cut at its control
-//! points, so that no bend and no jump lies within a piece; each piece has nodes of its own, and the sums at the nodes are
+//! points, and towards full opacity wherever what comes through halves, so that no bend and no jump lies within a piece; each piece has nodes of its own, and the sums at the nodes are
 //! worked out from -ln(1 - a) itself.
 //!
 //! A mean says nothing about which colour lies in front. Where that would show, a segment is cut at the control points and
@@ -106,7 +106,19 @@ impl Table {
             }
             if a.value < b.value {
                 let ends = [a.value, b.value].map(|v| table.position(v));
-                table.push(transfer, ends, [a.rgba, b.rgba], &mut sum);
+                let mut begin = (ends[0], a.rgba);
+                for part in opaque_cuts([a.rgba[3], b.rgba[3]]).chain([1.0]) {
+                    let mix = |c: usize| a.rgba[c] + (b.rgba[c] - a.rgba[c]) * part;
+                    let end = if part == 1.0 {
+                        (ends[1], b.rgba)
+                    } else {
+                        (ends[0] + (ends[1] - ends[0]) * part, std::array::from_fn(mix))
+                    };
+                    if begin.0 < end.0 {
+                        table.push(transfer, [begin.0, end.0], [begin.1, end.1], &mut sum);
+                        begin = end;
+                    }
+                }
             }
         }
         table.clear.extend(clear_from.map(|from| [from, f64::INFINITY]));
@@ -253,12 +265,39 @@ impl Table {
     #[inline(always)]
     pub(super) fn depth(&self, from: &Place, to: &Place, mm: f32) -> [f32; 4] {
         let rise = to.position - from.position;
-        let piece = &self.pieces[from.piece];
-        if rise.abs() * piece.scale > STILL {
+        let [piece, other] = [from, to].map(|place| &self.pieces[place.piece]);
+        if rise.abs() * piece.scale.min(other.scale) > STILL {
             let by = mm / rise;
             return std::array::from_fn(|c| (to.sum[c] - from.sum[c]) as f32 * by);
         }
+        if from.piece != to.piece {
+            return self.depth_across(from, to, mm);
+        }
         self.rate(piece, from.position + 0.5 * rise).map(|v| v * mm)
+    }
+
+    /// The same for places of different pieces that are near for the nodes of one of them.
+    #[cold]
+    #[inline(never)]
+    fn depth_across(&self, from: &Place, to: &Place, mm: f32) -> [f32; 4] {
+        let [low, high] = if from.position < to.position { [from, to] } else { [to, from] };
+        let mut sum = [0.0_f64; 4];
+        let mut at = low.position;
+        for index in low.piece..=high.piece {
+            let piece = &self.pieces[index];
+            let end = if index == high.piece { high.position } else { self.pieces[index + 1].from };
+            let width = end - at;
+            let part = if width * piece.scale > STILL {
+                let [a, b] = [at, end].map(|position| self.sum(piece, position));
+                std::array::from_fn(|c| b[c] - a[c])
+            } else {
+                self.rate(piece, at + 0.5 * width).map(|v| f64::from(v) * f64::from(width))
+            };
+            sum = std::array::from_fn(|c| sum[c] + part[c]);
+            at = end;
+        }
+        let by = f64::from(mm) / f64::from(high.position - low.position);
+        sum.map(|v| (v * by) as f32)
     }
 
     /// The same as [`Self::segment`] where it matters which colour is in front.
@@ -327,6 +366,16 @@ impl Table {
         let index = self.pieces.partition_point(|p| p.first < piece.first);
         Place { position, piece: index, sum: self.sum(piece, position), varied: 0.0 }
     }
+}
+
+/// Where opacity comes so near to 1 that its extinction grows without bound, a ramp is cut wherever what comes through has
+/// halved, and where opacity counts as no more: parts of the way, rising.
+fn opaque_cuts([from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
+    let halves = (3..20).map(|k| 1.0 - 0.5_f64.powi(k)).chain([Transfer::MAX_OPACITY]);
+    let mut parts: Vec<f64> =
+        halves.map(|a| (a - from) / (to - from)).filter(|p| *p > 0.0 && *p < 1.0).collect();
+    parts.sort_unstable_by(f64::total_cmp);
+    parts.into_iter()
 }
 
 /// The mean of a rate over a part of a piece, by five nodes of Gauss and Legendre.

@@ -84,6 +84,8 @@ pub(super) const LN_2_LOW: f32 = -2.121_944_4e-4;
 pub(super) struct Manner {
     /// Longest step; mm of zeta for one mm of ray.
     pub(super) step_mm: f32,
+    /// Steps at least between two places where a cell begins or ends, where several cells and nothing else are.
+    pub(super) steps_in_cells: u32,
     /// A pixel is done when no more than this comes through.
     pub(super) dark: f32,
 }
@@ -207,17 +209,18 @@ pub(super) fn pixel(
     light.pixel()
 }
 
-/// Passes a stretch in equal steps, each no longer than they may be, through what `step` says of it; whether the pixel
-/// is finished.
+/// Passes a stretch in equal steps, `least` of them at least and each no longer than they may be, through what `step` says of
+/// it; whether the pixel is finished.
 #[inline(always)]
 fn pass(
     [from, to]: [f32; 2],
+    least: u32,
     ray: &Ray,
     manner: Manner,
     light: &mut Light,
     mut step: impl FnMut(f32, f32) -> Option<[f32; 4]>,
 ) -> bool {
-    let count = (((to - from) * ray.mm_per_zeta / manner.step_mm).ceil() as u32).max(1);
+    let count = (((to - from) * ray.mm_per_zeta / manner.step_mm).ceil() as u32).max(least);
     let length = (to - from) / count as f32;
     let mut before = from;
     for i in 1..=count {
@@ -241,7 +244,7 @@ fn march(walker: &mut Walker<'_>, [from, to]: [f32; 2], ray: &Ray, manner: Manne
         let end = walker.next_bend(at).min(to);
         if !walker.clear
             && end > at
-            && pass([at, end], ray, manner, light, |before, here| walker.step(before, here, ray))
+            && pass([at, end], 1, ray, manner, light, |before, here| walker.step(before, here, ray))
         {
             return;
         }
@@ -294,7 +297,8 @@ fn march_many(
                 }
                 (depth[3] > 0.0).then_some(depth)
             };
-            if pass([at, end], ray, manner, light, step) {
+            let least = if in_pieces { 1 } else { manner.steps_in_cells };
+            if pass([at, end], least, ray, manner, light, step) {
                 return;
             }
         }

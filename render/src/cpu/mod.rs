@@ -133,6 +133,9 @@ pub enum Instructions {
     Plain,
 }
 
+/// Steps between two walls of cells where cells overlap, for one step a voxel.
+const STEPS_IN_CELLS: f64 = 8.0;
+
 /// Bands at most that grids are scan-converted for at once.
 const STRIP: usize = 8;
 
@@ -170,8 +173,12 @@ fn grid_alone(scene: &Scene) -> Option<&CellItem> {
     }
 }
 
-fn picture_of_grid(drawn: CellPicture) -> (FloatImage, Stats) {
+/// The picture of a grid that is alone; nothing where cells of it overlap, whose colours mix along their depth.
+fn picture_of_grid(drawn: CellPicture) -> Option<(FloatImage, Stats)> {
     let cells = drawn.stats;
+    if cells.total.overlaps + cells.total.overlapping_pixels > 0 {
+        return None;
+    }
     let stats = Stats {
         frame_ms: cells.prepare_ms + cells.frame_ms,
         prepare_ms: cells.prepare_ms,
@@ -180,7 +187,7 @@ fn picture_of_grid(drawn: CellPicture) -> (FloatImage, Stats) {
         grid: Some(cells),
         ..Stats::default()
     };
-    (drawn.image, stats)
+    Some((drawn.image, stats))
 }
 
 /// Draws scenes. Keeps what it knows of volumes from picture to picture.
@@ -216,8 +223,8 @@ impl CpuRenderer {
     /// `progress` is told, from any thread, how much of the picture is done and of how much; as soon as it answers `false`
     /// the drawing stops.
     ///
-    /// An unstructured grid that is alone in the scene is drawn by [`CellRenderer`], in drafts with early termination at what
-    /// a draft may leave out; such drafts depend on the threads' timing, within that.
+    /// An unstructured grid that is alone in the scene and of which no cells overlap is drawn by [`CellRenderer`], in drafts
+    /// with early termination at what a draft may leave out; such drafts depend on the threads' timing, within that.
     ///
     /// # Errors
     /// All of [`CpuError`].
@@ -232,8 +239,44 @@ impl CpuRenderer {
             let options = self.of_grids(quality);
             let breaks = Breaks::default();
             let drawn = self.cells.render(grid, &scene.camera, size, &options, breaks, progress)?;
-            return Ok(picture_of_grid(drawn));
+            if let Some(picture) = picture_of_grid(drawn) {
+                return Ok(picture);
+            }
         }
+        self.walk_rays(scene, size, quality, progress)
+    }
+
+    /// Draws as [`CpuRenderer::render`] does, but an unstructured grid that is alone in the scene by all processes of a group.
+    /// What else there is, is drawn by this process.
+    ///
+    /// # Errors
+    /// All of [`CpuError`].
+    pub fn render_by<L: Link>(
+        &mut self,
+        group: &mut Group<L>,
+        scene: &Scene,
+        size: [u32; 2],
+        quality: Quality,
+        progress: &(dyn Fn(usize, usize) -> bool + Sync),
+    ) -> Result<(FloatImage, Stats), CpuError> {
+        if let Some(grid) = grid_alone(scene) {
+            let options = self.of_grids(quality);
+            let drawn = group.render(grid, &scene.camera, size, &options, Breaks::default(), progress)?;
+            if let Some(picture) = picture_of_grid(drawn) {
+                return Ok(picture);
+            }
+        }
+        self.walk_rays(scene, size, quality, progress)
+    }
+
+    /// Any scene, ray by ray.
+    fn walk_rays(
+        &mut self,
+        scene: &Scene,
+        size: [u32; 2],
+        quality: Quality,
+        progress: &(dyn Fn(usize, usize) -> bool + Sync),
+    ) -> Result<(FloatImage, Stats), CpuError> {
         let begin = Instant::now();
         let [width, height] = size;
         let too_large = CpuError::Size { width, height };
@@ -256,7 +299,8 @@ impl CpuRenderer {
         let voxel_mm = placed.pieces.iter().map(|p| p.voxel_mm).fold(f64::INFINITY, f64::min);
         let voxel_mm = if voxel_mm.is_finite() { voxel_mm } else { 1.0 };
         stats.step_mm = voxel_mm * quality.voxels();
-        let manner = Manner { step_mm: stats.step_mm as f32, dark: self.dark(quality) };
+        let steps_in_cells = (STEPS_IN_CELLS / quality.voxels()).ceil() as u32;
+        let manner = Manner { step_mm: stats.step_mm as f32, steps_in_cells, dark: self.dark(quality) };
         let tiles = (width as usize).div_ceil(TILE) * (height as usize).div_ceil(TILE);
         for depths in &depths {
             let shown = depths.shown;
@@ -310,25 +354,6 @@ impl CpuRenderer {
         stats.tetrahedra_scanned = tetrahedra.into_inner();
         stats.frame_ms = begin.elapsed().as_secs_f64() * 1e3;
         Ok((FloatImage { width, height, pixels }, stats))
-    }
-
-    /// Draws as [`CpuRenderer::render`] does, but an unstructured grid that is alone in the scene by all processes of a group.
-    /// What else there is, is drawn by this process.
-    ///
-    /// # Errors
-    /// All of [`CpuError`].
-    pub fn render_by<L: Link>(
-        &mut self,
-        group: &mut Group<L>,
-        scene: &Scene,
-        size: [u32; 2],
-        quality: Quality,
-        progress: &(dyn Fn(usize, usize) -> bool + Sync),
-    ) -> Result<(FloatImage, Stats), CpuError> {
-        let Some(grid) = grid_alone(scene) else { return self.render(scene, size, quality, progress) };
-        let options = self.of_grids(quality);
-        let drawn = group.render(grid, &scene.camera, size, &options, Breaks::default(), progress)?;
-        Ok(picture_of_grid(drawn))
     }
 
     /// How a grid that is alone is drawn.

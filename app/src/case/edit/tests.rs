@@ -1,6 +1,7 @@
 //! Every change: what it does, and what it refuses.
 
 use super::*;
+use crate::case::grids::FieldChoice;
 use crate::case::{Case, Source, labels};
 use render::volume::{ControlPoint, Vector};
 
@@ -324,4 +325,57 @@ fn a_blend_and_a_mode_are_checked() {
     }
     let kept = (case.volumes[0].blend, case.volumes[0].mode);
     assert_eq!(kept, (0.25, VolumeMode::Isosurface { value: 300.0, opacity: 0.5 }), "the last good ones");
+}
+
+#[test]
+fn a_grid_rides_on_a_fragment_as_long_as_there_is_one() {
+    let mut case = planned();
+    split(&mut case, &["x"]).expect("two fragments");
+    let ride = |on: &str| {
+        let change = GridChange::Fragment(Some(on.to_owned()));
+        Edit::ChangeGrid { id: "stress".to_owned(), change }
+    };
+    apply(
+        &mut case,
+        Edit::AddGrid(Box::new(UnstructuredGrid::new("stress", Source::Builtin("s".to_owned())))),
+    )
+    .expect("a grid");
+    let before = case.clone();
+    let missing = apply(&mut case, ride("nobody"));
+    assert!(matches!(missing, Err(EditError::Missing { kind: "fragment", .. })), "{missing:?}");
+    assert_eq!(case, before, "as it was");
+    let rides_on = |case: &Case| case.grids[0].fragment.clone();
+    let first = case.fragments[0].id.clone();
+    apply(&mut case, ride(&first)).expect("rides");
+    apply(&mut case, Edit::RenameFragment { id: first, to: "x".to_owned() }).expect("renamed");
+    assert_eq!(rides_on(&case).as_deref(), Some("x"), "it follows the name");
+    let volume = case.fragments[0].volume.clone();
+    apply(&mut case, Edit::Unsplit { volume }).expect("whole again");
+    assert_eq!(rides_on(&case), None, "the fragment is gone");
+    let change = |change| Edit::ChangeGrid { id: "stress".to_owned(), change };
+    for (refused, what) in [
+        (GridChange::Scale(0.0), "a scale of nothing"),
+        (GridChange::Rename(String::new()), "no name"),
+        (
+            GridChange::Pose(
+                Affine::from_columns(Vector::x() * 2.0, Vector::y(), Vector::z(), Point::origin())
+                    .expect("a matrix"),
+            ),
+            "a pose that scales",
+        ),
+    ] {
+        let before = case.clone();
+        assert!(apply(&mut case, change(refused)).is_err(), "{what}");
+        assert_eq!(case, before, "as it was after {what}");
+    }
+    let scalar = FieldChoice { name: "p".to_owned(), place: None, part: None };
+    apply(&mut case, change(GridChange::Unit("MPa".to_owned()))).expect("a unit");
+    apply(&mut case, change(GridChange::Field(Some(scalar)))).expect("a field");
+    assert_eq!(
+        (case.grids[0].unit.as_str(), &case.grids[0].transfer),
+        ("", &None),
+        "another field has another unit"
+    );
+    apply(&mut case, change(GridChange::Remove)).expect("away");
+    assert!(case.grids.is_empty(), "away");
 }

@@ -200,6 +200,10 @@ impl Dataset {
             faces.positions = self.points;
             return faces.finish(name, FORMAT, Frame::Lps, Unit::Unstated, self.notes);
         }
+        if kinds.is_empty() && dropped > 0 {
+            let what = format!("{dropped} cells, none of them a tetrahedron, pyramid, wedge or hexahedron");
+            return Err(Fault::Unsupported(what, "export it with cells of these kinds"));
+        }
         tell_left_out(dropped, bent, &mut self.notes);
         let count = self.types.len();
         let only = (kept.len() < count).then_some(kept.as_slice());

@@ -103,7 +103,7 @@ pub enum CellGridError {
         count: usize,
     },
     /// A point has a coordinate that is not finite.
-    #[error("point {point} has a coordinate that is not finite")]
+    #[error("point {point} has a coordinate that is not finite, or beyond {FARTHEST_MM:e} mm")]
     NotFinite {
         /// Position of the point.
         point: usize,
@@ -149,6 +149,9 @@ pub enum CellGridError {
     },
 }
 
+/// Coordinates beyond this are not a place; mm. Volumes of cells must stay finite.
+pub const FARTHEST_MM: f64 = 1e30;
+
 /// Cells between points, with fields over time; millimetres in the grid's own frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellGrid {
@@ -178,7 +181,7 @@ impl CellGrid {
         if u32::try_from(largest).is_err() {
             return Err(CellGridError::TooMany { count: largest });
         }
-        if let Some(point) = points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+        if let Some(point) = points.iter().position(|p| p.iter().any(|c| !(c.abs() <= FARTHEST_MM))) {
             return Err(CellGridError::NotFinite { point });
         }
         let needed = kinds.iter().map(|kind| kind.corners()).sum();
