@@ -27,10 +27,14 @@ fn vtk(points: &[[f64; 3]], cells: &[&[i64]], kind: u8, values: &[f64]) -> Strin
         writeln!(text, "{} {}", cell.len(), corners.join(" ")).unwrap();
     }
     writeln!(text, "CELL_TYPES {}", cells.len()).unwrap();
-    cells.iter().for_each(|_| writeln!(text, "{kind}").unwrap());
+    for _ in cells {
+        writeln!(text, "{kind}").unwrap();
+    }
     if !values.is_empty() {
         writeln!(text, "POINT_DATA {}\nSCALARS p double 1\nLOOKUP_TABLE default", values.len()).unwrap();
-        values.iter().for_each(|v| writeln!(text, "{v:e}").unwrap());
+        for v in values {
+            writeln!(text, "{v:e}").unwrap();
+        }
     }
     text.replace("NaN", "nan").replace("inf", "1e999")
 }

@@ -12,7 +12,7 @@ use ::compress::bc::Level;
 use ::compress::pvtc::Layout;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::headless::{self, Failure};
+use crate::headless::{self, Failure, ranks};
 use crate::host::HostError;
 use crate::load::LoadError;
 use crate::save::choice::Goal;
@@ -397,6 +397,15 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
+    if ranks::count() > 1 && !matches!(cli.command, Some(Command::Render(_))) {
+        let fault = "mpirun has started several processes, and only render can be done by several";
+        // One of them says so for all.
+        return if ranks::is_first() {
+            fail(&format!("{fault}; start this without mpirun"), 2)
+        } else {
+            ExitCode::SUCCESS
+        };
+    }
     let done = match &cli.command {
         None => return window(cli.paths),
         Some(Command::Info(args)) => headless::info::run(args),

@@ -97,6 +97,8 @@ pub struct Stats {
     /// By the CPU: those scan-converted, once for each strip of the picture that they are before; the others are clear or
     /// beside the picture.
     pub tetrahedra_scanned: u64,
+    /// How a grid that is alone in the scene was drawn.
+    pub grid: Option<crate::cells::Stats>,
     /// By the CPU: pixels that were done before their ray's end.
     pub pixels_finished: u64,
     /// By the CPU: volumes made ready for this picture; the others were.

@@ -80,9 +80,9 @@ impl FieldChoice {
     /// The scalar of a grid that this means; nothing where the first step has none such.
     pub fn of(&self, grid: &CellGrid) -> Option<Scalar> {
         let step = grid.steps().first()?;
-        let places =
+        let mut places =
             [Place::Points, Place::Cells].into_iter().filter(|p| self.place.is_none_or(|own| own == *p));
-        let (place, field) = places.filter_map(|p| Some((p, step.field(p, &self.name)?))).next()?;
+        let (place, field) = places.find_map(|p| Some((p, step.field(p, &self.name)?)))?;
         let whole = if field.components() == 1 { Part::Component(0) } else { Part::Magnitude };
         let scalar = Scalar { place, name: self.name.clone(), part: self.part.unwrap_or(whole) };
         scalar.field(step).is_some().then_some(scalar)
@@ -97,7 +97,7 @@ pub enum GridChange {
     /// Another id.
     Rename(String),
     /// Moves it; rigid.
-    Pose(Affine),
+    Pose(Box<Affine>),
     /// Millimetres per unit; > 0.
     Scale(f64),
     /// The fragment that it rides on, by id.
@@ -143,7 +143,7 @@ pub(super) fn apply(case: &mut Case, id: &str, change: GridChange) -> Result<(),
             check_fragment(case, fragment.as_deref())?;
             case.grids[index].fragment = fragment;
         }
-        GridChange::Pose(pose) => case.grids[index].pose = check_pose(id, pose)?,
+        GridChange::Pose(pose) => case.grids[index].pose = check_pose(id, *pose)?,
         GridChange::Scale(scale) => case.grids[index].scale = check_scale(scale)?,
         GridChange::Visible(visible) => case.grids[index].visible = visible,
         GridChange::Field(field) => {

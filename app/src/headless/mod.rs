@@ -24,6 +24,7 @@ pub mod info;
 pub mod input;
 mod play;
 pub mod plot;
+pub mod ranks;
 pub mod render;
 pub mod section;
 mod series;

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use ::render::TextureSummary;
+use ::render::cells;
 use ::render::cpu::{self, CpuRenderer};
 use ::render::gpu::{Gpu, GpuError};
 use ::render::image::FloatImage;
@@ -13,6 +14,7 @@ use ::render::renderer::{Quality, Stats};
 use ::render::scene::Scene;
 use serde_json::{Map, Value, json};
 
+use super::ranks::{self, Place, Ranks};
 use super::{Failure, Terminal, check_folder, input, say, write_file};
 use crate::cli::{Backend, QualityName, RenderArgs};
 use crate::load::Progress as _;
@@ -30,6 +32,11 @@ enum Kind {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
+    let ranks = match ranks::join()? {
+        Place::Alone => None,
+        Place::First(ranks) => Some(ranks),
+        Place::Done => return Ok(()),
+    };
     let kind = kind(&args.out)?;
     check_folder(&args.out)?;
     let begin = Instant::now();
@@ -37,9 +44,9 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let load_ms = ms(begin);
     let scene = scene::scene(&input.case, &input.assets);
     let (picture, mut stats, statement) = match args.backend {
-        Backend::Auto => by_either(&scene, args)?,
+        Backend::Auto => by_either(&scene, args, ranks)?,
         Backend::Gpu => by_gpu(Gpu::headless()?, &scene, args)?,
-        Backend::Cpu => by_cpu(&scene, args)?,
+        Backend::Cpu => by_cpu(&scene, args, ranks)?,
         Backend::Reference => by_reference(&scene, args.size)?,
     };
     let begin = Instant::now();
@@ -73,14 +80,14 @@ fn kind(path: &Path) -> Result<Kind, Failure> {
 type Drawn = (FloatImage, Map<String, Value>, String);
 
 /// By the GPU, unless it is none and the processor shows the same, or only the processor can.
-fn by_either(scene: &Scene, args: &RenderArgs) -> Result<Drawn, Failure> {
+fn by_either(scene: &Scene, args: &RenderArgs, ranks: Option<Ranks>) -> Result<Drawn, Failure> {
     if cpu::alone_shows(scene) {
-        return by_cpu(scene, args);
+        return by_cpu(scene, args, ranks);
     }
     match Gpu::headless() {
-        Ok(gpu) if gpu.caps().software && cpu::shows(scene) => by_cpu(scene, args),
+        Ok(gpu) if gpu.caps().software && cpu::shows(scene) => by_cpu(scene, args, ranks),
         Ok(gpu) => by_gpu(gpu, scene, args),
-        Err(GpuError::NoAdapter { .. }) if cpu::shows(scene) => by_cpu(scene, args),
+        Err(GpuError::NoAdapter { .. }) if cpu::shows(scene) => by_cpu(scene, args, ranks),
         Err(error) => Err(error.into()),
     }
 }
@@ -93,11 +100,15 @@ fn quality(args: &RenderArgs) -> Quality {
     }
 }
 
-fn by_cpu(scene: &Scene, args: &RenderArgs) -> Result<Drawn, Failure> {
+fn by_cpu(scene: &Scene, args: &RenderArgs, ranks: Option<Ranks>) -> Result<Drawn, Failure> {
     let terminal = Terminal::default();
     let progress = |done: usize, total: usize| terminal.step("drawing", done, total);
     let quality = quality(args);
-    let (picture, stats) = CpuRenderer::new().render(scene, args.size, quality, &progress)?;
+    let mut renderer = CpuRenderer::new();
+    let (picture, stats) = match ranks {
+        Some(mut ranks) => renderer.render_by(&mut ranks, scene, args.size, quality, &progress)?,
+        None => renderer.render(scene, args.size, quality, &progress)?,
+    };
     let mut map = Map::new();
     map.insert("backend".to_owned(), json!("cpu"));
     map.insert("threads".to_owned(), json!(rayon::current_num_threads()));
@@ -162,6 +173,7 @@ pub(super) fn figures(stats: &Stats, map: &mut Map<String, Value>) {
         "cells": stats.cells,
         "tetrahedra": stats.tetrahedra,
         "tetrahedra_scanned": stats.tetrahedra_scanned,
+        "grid": stats.grid.as_ref().map(grid),
         "pixels_finished": stats.pixels_finished,
         "bands": stats.bands,
         "textures": textures,
@@ -170,6 +182,28 @@ pub(super) fn figures(stats: &Stats, map: &mut Map<String, Value>) {
     if let Value::Object(object) = object {
         map.extend(object);
     }
+}
+
+/// Figures of a grid that was drawn alone, and of the workers that drew it.
+fn grid(stats: &cells::Stats) -> Value {
+    let total = &stats.total;
+    let each = |figure: fn(&cells::Counts) -> u64| stats.workers.iter().map(figure).collect::<Vec<_>>();
+    json!({
+        "workers": stats.workers.len(),
+        "imbalance": stats.imbalance(),
+        "segments": total.segments,
+        "outside": total.outside,
+        "clear": total.clear,
+        "hidden": total.hidden,
+        "not_finite": total.not_finite,
+        "overlapping_pixels": total.overlapping_pixels,
+        "messages": total.messages,
+        "bytes": total.bytes,
+        "bytes_of_cells": total.cell_bytes,
+        "clusters_taken": total.taken,
+        "work": each(cells::Counts::work),
+        "tetrahedra_held": each(|counts| counts.held),
+    })
 }
 
 /// One texture's figures. JSON has no infinity: a lossless texture's PSNR is `null`.

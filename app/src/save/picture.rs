@@ -44,7 +44,7 @@ fn text_chunk(statement: &str) -> Vec<u8> {
 /// # Errors
 /// What the encoder says, which is only about sizes it does not take.
 pub fn exr(picture: &FloatImage, statement: &str) -> exr::error::Result<Vec<u8>> {
-    use exr::prelude::{Image, SpecificChannels, Text, Vec2, WritableImage as _};
+    use exr::prelude::{Image, LineOrder, SpecificChannels, Text, Vec2, WritableImage as _};
     let width = picture.width as usize;
     let pixel = |at: Vec2<usize>| {
         let [r, g, b, a] = picture.pixels[at.y() * width + at.x()];
@@ -52,6 +52,8 @@ pub fn exr(picture: &FloatImage, statement: &str) -> exr::error::Result<Vec<u8>>
     };
     let size = (width, picture.height as usize);
     let mut image = Image::from_channels(size, SpecificChannels::rgba(pixel));
+    // Else blocks stand in the order in which threads were done with them.
+    image.layer_data.encoding.line_order = LineOrder::Increasing;
     if !statement.is_empty() {
         image.layer_data.attributes.comments = Text::new_or_none(statement);
     }
@@ -82,6 +84,18 @@ mod tests {
                 assert_eq!(found.0.map(f32::to_bits), wanted.map(f32::to_bits), "bits");
             }
             assert_eq!(bytes.windows(10).any(|w| w == b"lossy: bc4"), !statement.is_empty(), "comment");
+        }
+    }
+
+    #[test]
+    fn an_exr_has_the_same_bytes_each_time() {
+        let mut picture = FloatImage::clear(300, 400);
+        for (i, p) in picture.pixels.iter_mut().enumerate() {
+            *p = [(i as f32).sin(); 4];
+        }
+        let known = exr(&picture, "").expect("written");
+        for _ in 0..5 {
+            assert!(exr(&picture, "").expect("written") == known, "whichever thread is done first");
         }
     }
 

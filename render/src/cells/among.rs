@@ -7,14 +7,15 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::CellsError;
 use super::clusters::{Clusters, Scalars};
 use super::lens::Lens;
 use super::project::{Breaks, Frame, Gathered, Projector};
 use super::scan::{Raw, Rect};
 use super::stats::Counts;
 use super::table::{Place, Table};
+use super::{CellsError, Options, Prepared};
 use crate::scene::CellItem;
+use crate::simd::has_wide;
 use crate::view::View;
 
 /// A grid before the camera.
@@ -33,12 +34,12 @@ pub(crate) struct Placed {
 
 impl Placed {
     pub(super) fn new(
-        (clusters, scalars): (Arc<Clusters>, Arc<Scalars>),
+        (clusters, scalars): Prepared,
         item: &CellItem,
         view: &View,
-        skip_clear: bool,
-        wide: bool,
+        options: &Options,
     ) -> Self {
+        let (skip_clear, wide) = (options.skip_clear, options.wide && has_wide());
         let (table, lens) = (Table::new(&item.transfer), Lens::new(view, &item.pose));
         let reaches = Vec::new();
         let mut placed = Self { clusters, scalars, table, lens, size: view.size, skip_clear, wide, reaches };
@@ -262,7 +263,7 @@ impl Walker<'_> {
 }
 
 impl super::CellRenderer {
-    /// Makes grids ready to be drawn among other things. Clear cells may be left out.
+    /// Makes grids ready to be drawn among other things. Of the options only what is skipped and the instructions are looked at.
     ///
     /// # Errors
     /// [`CellsError::Step`] and [`CellsError::Field`].
@@ -270,11 +271,10 @@ impl super::CellRenderer {
         &mut self,
         items: &[CellItem],
         view: &View,
-        skip_clear: bool,
-        wide: bool,
+        options: &Options,
     ) -> Result<Vec<Placed>, CellsError> {
         let ready = self.prepare(items)?;
         let placed = items.iter().zip(ready);
-        Ok(placed.map(|(item, ready)| Placed::new(ready, item, view, skip_clear, wide)).collect())
+        Ok(placed.map(|(item, ready)| Placed::new(ready, item, view, options)).collect())
     }
 }

@@ -2,6 +2,11 @@
 //!
 //! Clusters hold their own corners, those of lower numbers first, so that the order of the grid's points decides ties
 //! everywhere. Which cells share a cluster depends on geometry and point numbers alone, not on the order of cells.
+//!
+//! Of every cluster a worker knows the [`Outline`]: that is enough to share them out. Its [`Body`] and its values, which are
+//! what takes memory, are only where it is drawn; workers in one process have all of them in common.
+
+use std::sync::OnceLock;
 
 use super::split;
 use crate::volume::cells::{CellGrid, CellKind, Place};
@@ -29,25 +34,34 @@ pub fn faults(grid: &CellGrid) -> Faults {
 /// Cells of a grid, ready to be drawn from anywhere.
 #[derive(Debug)]
 pub(super) struct Clusters {
-    list: Vec<Cluster>,
-    points: Vec<[f64; 3]>,
-    /// Their numbers in the grid.
+    outlines: Vec<Outline>,
+    /// Those that are here.
+    bodies: Vec<OnceLock<Body>>,
+    /// Numbers in the grid of the points of one cluster after the other; empty where the grid is not here.
     numbers: Vec<u32>,
-    tetrahedra: Vec<[u32; 4]>,
-    /// The cell that each is of.
+    /// The cell that each tetrahedron is of; empty where the grid is not here.
     cells: Vec<u32>,
     pub(super) faults: Faults,
 }
 
-/// One of the clusters: ranges of the lists, and its box.
-#[derive(Debug, Clone, Copy)]
-struct Cluster {
-    points: [u32; 2],
-    tetrahedra: [u32; 2],
-    low: Point,
-    high: Point,
+/// What every worker knows of a cluster.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Outline {
+    pub(super) points: u32,
+    pub(super) tetrahedra: u32,
+    /// Its box.
+    pub(super) low: Point,
+    pub(super) high: Point,
     /// Mean of the cells' longest sides along an axis; mm of the grid.
-    cell_mm: f64,
+    pub(super) cell_mm: f64,
+}
+
+/// The cells of a cluster.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Body {
+    pub(super) points: Vec<[f64; 3]>,
+    /// Corners of each, positions among the points.
+    pub(super) tetrahedra: Vec<[u32; 4]>,
 }
 
 /// A tetrahedron with its corners' numbers in rising order.
@@ -63,10 +77,9 @@ impl Clusters {
         let mut faults = Faults::default();
         let mut parts = parts(grid, &mut faults);
         let mut clusters = Self {
-            list: Vec::new(),
-            points: Vec::new(),
+            outlines: Vec::new(),
+            bodies: Vec::new(),
             numbers: Vec::new(),
-            tetrahedra: Vec::with_capacity(parts.len()),
             cells: Vec::with_capacity(parts.len()),
             faults,
         };
@@ -116,11 +129,11 @@ impl Clusters {
         let mut numbers: Vec<u32> = of().flat_map(|p| p.corners).collect();
         numbers.sort_unstable();
         numbers.dedup();
-        let begin = [self.points.len() as u32, self.tetrahedra.len() as u32];
+        let mut body = Body::default();
         let mut size = 0.0;
         for part in of() {
             // Every corner is among the numbers.
-            self.tetrahedra.push(part.corners.map(|n| numbers.binary_search(&n).unwrap_or(0) as u32));
+            body.tetrahedra.push(part.corners.map(|n| numbers.binary_search(&n).unwrap_or(0) as u32));
             self.cells.push(part.cell);
             let [a, b, c, d] = part.corners.map(|n| grid.points()[n as usize].coords);
             size += (a.sup(&b).sup(&c.sup(&d)) - a.inf(&b).inf(&c.inf(&d))).max();
@@ -129,43 +142,80 @@ impl Clusters {
         for &number in &numbers {
             let p = &grid.points()[number as usize];
             (low, high) = (low.inf(p), high.sup(p));
-            self.points.push([p.x, p.y, p.z]);
+            body.points.push([p.x, p.y, p.z]);
         }
         self.numbers.extend(numbers);
-        let end = [self.points.len() as u32, self.tetrahedra.len() as u32];
-        self.list.push(Cluster {
-            points: [begin[0], end[0]],
-            tetrahedra: [begin[1], end[1]],
-            low,
-            high,
-            cell_mm: size / f64::from(end[1] - begin[1]),
-        });
+        let [points, tetrahedra] = [body.points.len() as u32, body.tetrahedra.len() as u32];
+        let cell_mm = size / f64::from(tetrahedra);
+        self.outlines.push(Outline { points, tetrahedra, low, high, cell_mm });
+        self.bodies.push(OnceLock::from(body));
+    }
+
+    /// Clusters of a grid that is elsewhere; none of their bodies is here.
+    pub(super) fn elsewhere(outlines: Vec<Outline>) -> Self {
+        let bodies = outlines.iter().map(|_| OnceLock::new()).collect();
+        Self { outlines, bodies, numbers: Vec::new(), cells: Vec::new(), faults: Faults::default() }
     }
 
     pub(super) fn len(&self) -> usize {
-        self.list.len()
+        self.outlines.len()
+    }
+
+    pub(super) fn outlines(&self) -> &[Outline] {
+        &self.outlines
     }
 
     /// How many tetrahedra a cluster has.
     pub(super) fn count(&self, cluster: usize) -> usize {
-        let [from, to] = self.list[cluster].tetrahedra;
-        (to - from) as usize
+        self.outlines[cluster].tetrahedra as usize
     }
 
+    /// A cluster's cells, where they are here.
+    pub(super) fn body(&self, cluster: usize) -> Option<&Body> {
+        self.bodies.get(cluster)?.get()
+    }
+
+    /// Takes over the cells of a cluster; not where they do not fit to its outline.
+    pub(super) fn take(&self, cluster: usize, body: Body) -> bool {
+        let (Some(outline), Some(place)) = (self.outlines.get(cluster), self.bodies.get(cluster)) else {
+            return false;
+        };
+        let fits = body.points.len() == outline.points as usize
+            && body.tetrahedra.len() == outline.tetrahedra as usize
+            && body.tetrahedra.iter().flatten().all(|&corner| corner < outline.points);
+        if fits {
+            place.get_or_init(|| body);
+        }
+        fits
+    }
+
+    /// Forgets the cells of some clusters.
+    pub(super) fn retain(&mut self, keep: impl Fn(usize) -> bool) {
+        for (cluster, body) in self.bodies.iter_mut().enumerate() {
+            if !keep(cluster) {
+                body.take();
+            }
+        }
+    }
+
+    /// How many tetrahedra are here.
+    pub(super) fn held(&self) -> u64 {
+        self.bodies.iter().filter_map(OnceLock::get).map(|body| body.tetrahedra.len() as u64).sum()
+    }
+
+    /// The points of a cluster that is here.
     pub(super) fn points(&self, cluster: usize) -> &[[f64; 3]] {
-        let [from, to] = self.list[cluster].points;
-        &self.points[from as usize..to as usize]
+        self.body(cluster).map_or(&[], |body| &body.points)
     }
 
-    /// Corners of each tetrahedron, positions among the cluster's points.
+    /// Corners of each tetrahedron of a cluster that is here, positions among its points.
     pub(super) fn tetrahedra(&self, cluster: usize) -> &[[u32; 4]] {
-        let [from, to] = self.list[cluster].tetrahedra;
-        &self.tetrahedra[from as usize..to as usize]
+        self.body(cluster).map_or(&[], |body| &body.tetrahedra)
     }
 
     /// Corners of the box of a cluster.
     pub(super) fn corners(&self, cluster: usize) -> [Point; 8] {
-        let [a, b] = [self.list[cluster].low, self.list[cluster].high];
+        let [a, b] = [self.outlines[cluster].low, self.outlines[cluster].high];
         std::array::from_fn(|i| {
             let of = |axis: usize| if i >> axis & 1 == 0 { a[axis] } else { b[axis] };
             Point::new(of(0), of(1), of(2))
@@ -174,7 +224,7 @@ impl Clusters {
 
     /// Mean length of a cluster's cells; mm of the grid.
     pub(super) fn cell_mm(&self, cluster: usize) -> f64 {
-        self.list[cluster].cell_mm
+        self.outlines[cluster].cell_mm
     }
 }
 
@@ -211,44 +261,124 @@ fn parts(grid: &CellGrid, faults: &mut Faults) -> Vec<Part> {
 #[derive(Debug)]
 pub(super) struct Scalars {
     place: Place,
-    /// One for each of the clusters' points or tetrahedra.
-    values: Vec<f64>,
+    /// One for each point or tetrahedron of a cluster; those of clusters that are here.
+    values: Vec<OnceLock<Vec<f64>>>,
     /// Least and greatest finite value of each cluster.
     ranges: Vec<[f64; 2]>,
 }
 
 impl Scalars {
-    /// `value` gives the scalar of a point or a cell of the grid.
+    /// `value` gives the scalar of a point or a cell of the grid, which is here.
     pub(super) fn new(clusters: &Clusters, place: Place, value: impl Fn(usize) -> f64) -> Self {
-        let numbers = match place {
-            Place::Points => &clusters.numbers,
-            Place::Cells => &clusters.cells,
+        let mut rest = match place {
+            Place::Points => &clusters.numbers[..],
+            Place::Cells => &clusters.cells[..],
         };
-        let values: Vec<f64> = numbers.iter().map(|&n| value(n as usize)).collect();
-        let mut scalars = Self { place, values, ranges: Vec::with_capacity(clusters.len()) };
-        for cluster in 0..clusters.len() {
-            let finite = scalars.of(clusters, cluster).iter().filter(|v| v.is_finite());
+        let count = clusters.len();
+        let mut scalars =
+            Self { place, values: Vec::with_capacity(count), ranges: Vec::with_capacity(count) };
+        for outline in &clusters.outlines {
+            let (mine, others) = rest.split_at(scalars.needed(outline));
+            rest = others;
+            let values: Vec<f64> = mine.iter().map(|&n| value(n as usize)).collect();
+            let finite = values.iter().filter(|v| v.is_finite());
             let range = finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &v| [a.min(v), b.max(v)]);
+            scalars.values.push(OnceLock::from(values));
             scalars.ranges.push(range);
         }
         scalars
+    }
+
+    /// The scalar of a grid that is elsewhere; none of its values is here.
+    pub(super) fn elsewhere(place: Place, ranges: Vec<[f64; 2]>) -> Self {
+        Self { place, values: ranges.iter().map(|_| OnceLock::new()).collect(), ranges }
+    }
+
+    /// How many values a cluster has.
+    fn needed(&self, outline: &Outline) -> usize {
+        let count = match self.place {
+            Place::Points => outline.points,
+            Place::Cells => outline.tetrahedra,
+        };
+        count as usize
     }
 
     pub(super) fn place(&self) -> Place {
         self.place
     }
 
-    /// The scalar of each point, or tetrahedron, of a cluster.
-    pub(super) fn of(&self, clusters: &Clusters, cluster: usize) -> &[f64] {
-        let [from, to] = match self.place {
-            Place::Points => clusters.list[cluster].points,
-            Place::Cells => clusters.list[cluster].tetrahedra,
+    /// Whether a cluster can be drawn here.
+    pub(super) fn has(&self, clusters: &Clusters, cluster: usize) -> bool {
+        clusters.body(cluster).is_some() && self.values.get(cluster).is_some_and(|v| v.get().is_some())
+    }
+
+    /// Takes over the values of a cluster; not where they are not as many as its outline says.
+    pub(super) fn take(&self, clusters: &Clusters, cluster: usize, values: Vec<f64>) -> bool {
+        let (Some(outline), Some(place)) = (clusters.outlines.get(cluster), self.values.get(cluster)) else {
+            return false;
         };
-        &self.values[from as usize..to as usize]
+        let fits = values.len() == self.needed(outline);
+        if fits {
+            place.get_or_init(|| values);
+        }
+        fits
+    }
+
+    /// Forgets the values of some clusters.
+    pub(super) fn retain(&mut self, keep: impl Fn(usize) -> bool) {
+        for (cluster, values) in self.values.iter_mut().enumerate() {
+            if !keep(cluster) {
+                values.take();
+            }
+        }
+    }
+
+    /// The scalar of each point, or tetrahedron, of a cluster that is here.
+    pub(super) fn of(&self, cluster: usize) -> &[f64] {
+        self.values[cluster].get().map_or(&[], |values| values)
     }
 
     /// Least and greatest finite value of a cluster; the first is the greater where there is none.
     pub(super) fn range(&self, cluster: usize) -> [f64; 2] {
         self.ranges[cluster]
+    }
+
+    pub(super) fn ranges(&self) -> &[[f64; 2]] {
+        &self.ranges
+    }
+}
+
+/// What a worker lacks of a cluster.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Pack {
+    pub(super) cluster: u32,
+    /// Its cells, where the worker has not got them.
+    pub(super) body: Option<Body>,
+    pub(super) values: Vec<f64>,
+}
+
+impl Pack {
+    /// All of a cluster that is here.
+    pub(super) fn of(clusters: &Clusters, scalars: &Scalars, cluster: u32) -> Self {
+        let body = clusters.body(cluster as usize).cloned();
+        Self { body, ..Self::values_of(scalars, cluster) }
+    }
+
+    /// The values of a cluster that is here.
+    pub(super) fn values_of(scalars: &Scalars, cluster: u32) -> Self {
+        Self { cluster, body: None, values: scalars.of(cluster as usize).to_vec() }
+    }
+
+    /// About how many bytes it has.
+    pub(super) fn bytes(&self) -> usize {
+        let body = self.body.as_ref().map_or(0, |body| 24 * body.points.len() + 8 * body.tetrahedra.len());
+        body + 8 * self.values.len()
+    }
+
+    /// Puts it where it belongs; not where it does not fit there.
+    pub(super) fn unpack(self, clusters: &Clusters, scalars: &Scalars) -> bool {
+        let cluster = self.cluster as usize;
+        self.body.is_none_or(|body| clusters.take(cluster, body))
+            && scalars.take(clusters, cluster, self.values)
     }
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use super::CellsError;
 use super::link::{Link, LinkError, Post};
 use super::project::Frame;
-use super::worker::{Gathered, Manner, Step, Worker};
+use super::worker::{Gathered, Manner, Start, Step, Worker};
 
 /// What drives workers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -52,7 +52,10 @@ impl Engine {
         let post = Post::new(jobs.queues.len());
         let workers = jobs.queues.into_iter().enumerate();
         let mut workers: Vec<_> = workers
-            .map(|(rank, queue)| Worker::new(frame, manner, post.link(rank), queue, left.clone()))
+            .map(|(rank, queue)| {
+                let start = Start { queue, left: left.clone(), homes: &[] };
+                Worker::new(frame, manner, post.link(rank), start)
+            })
             .collect();
         match self {
             Self::Threads => threads(workers, &post, total, jobs.progress),

@@ -5,7 +5,7 @@ use crate::view::View;
 use crate::volume::{Affine, Point};
 
 /// From a grid's frame to depth and pixels; the middle of the first pixel is (0, 0).
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lens {
     view_from_grid: [[f64; 4]; 3],
     /// Pixels a mm, or a unit of slope.
@@ -24,6 +24,30 @@ impl Lens {
             scale: [half[0] / view.lens[0], -half[1] / view.lens[1]],
             middle: half.map(|h| h - 0.5),
             perspective: view.perspective,
+        }
+    }
+
+    /// Numbers that make one up.
+    pub(super) const NUMBERS: usize = 17;
+
+    /// As a message has it.
+    pub(super) fn to_list(self) -> [f64; Self::NUMBERS] {
+        let [x, y, z] = self.view_from_grid;
+        let mut list = [0.0; Self::NUMBERS];
+        let flag = [f64::from(u8::from(self.perspective))];
+        for (place, v) in list.iter_mut().zip([&x[..], &y, &z, &self.scale, &self.middle, &flag].concat()) {
+            *place = v;
+        }
+        list
+    }
+
+    /// From a message.
+    pub(super) fn from_list(list: [f64; Self::NUMBERS]) -> Self {
+        Self {
+            view_from_grid: std::array::from_fn(|r| std::array::from_fn(|c| list[4 * r + c])),
+            scale: [list[12], list[13]],
+            middle: [list[14], list[15]],
+            perspective: list[16] != 0.0,
         }
     }
 

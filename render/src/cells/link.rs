@@ -15,8 +15,19 @@ pub enum LinkError {
         /// Which.
         rank: usize,
     },
+    /// Another worker can do no more, and has said why.
+    #[error("worker {rank} cannot go on: {fault}")]
+    Failed {
+        /// Which.
+        rank: usize,
+        /// What it said.
+        fault: String,
+    },
+    /// The first worker has given the picture up.
+    #[error("the picture was given up by the first worker")]
+    Stopped,
     /// A message makes no sense.
-    #[error("worker {rank} sent a message that cannot be read")]
+    #[error("worker {rank} sent a message that cannot be read; every worker must run the same program")]
     Message {
         /// From which.
         rank: usize,
@@ -51,6 +62,28 @@ pub trait Link {
     /// # Errors
     /// [`LinkError::Lost`].
     fn wait(&mut self) -> Result<(), LinkError>;
+}
+
+impl<L: Link + ?Sized> Link for Box<L> {
+    fn rank(&self) -> usize {
+        (**self).rank()
+    }
+
+    fn size(&self) -> usize {
+        (**self).size()
+    }
+
+    fn send(&mut self, to: usize, message: Vec<u8>) -> Result<(), LinkError> {
+        (**self).send(to, message)
+    }
+
+    fn poll(&mut self) -> Result<Option<(usize, Vec<u8>)>, LinkError> {
+        (**self).poll()
+    }
+
+    fn wait(&mut self) -> Result<(), LinkError> {
+        (**self).wait()
+    }
 }
 
 #[derive(Debug, Default)]

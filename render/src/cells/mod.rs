@@ -27,15 +27,21 @@
 //! order of the grid's cells, or on the processor's instructions. With it they depend on the workers' timing, within its bound.
 
 mod among;
+mod bytes;
 mod clusters;
 mod early;
 mod engine;
 mod fold;
+mod group;
 mod lens;
 mod link;
 mod lists;
+#[cfg(feature = "mpi")]
+pub mod mpi;
+mod orders;
 mod project;
 mod scan;
+mod serve;
 mod split;
 mod spread;
 mod stats;
@@ -50,6 +56,7 @@ pub use clusters::{Faults, faults};
 pub use early::Early;
 pub use engine::Engine;
 pub use fold::Segment;
+pub use group::Group;
 pub use link::{Link, LinkError};
 pub use project::Breaks;
 pub use spread::Spread;
@@ -71,7 +78,7 @@ use lens::Lens;
 use project::Frame;
 use spread::queues;
 use table::Table;
-use worker::{Gathered, Manner, Worker};
+use worker::{Gathered, Manner};
 
 /// The largest picture: 16 384 × 16 384.
 pub const MAX_PIXELS: u64 = 1 << 28;
@@ -216,6 +223,9 @@ struct Kept {
     scalars: Vec<(usize, Scalar, Arc<Scalars>)>,
 }
 
+/// What of a grid does not depend on the view.
+type Prepared = (Arc<Clusters>, Arc<Scalars>);
+
 /// Draws grids. Keeps what it has made ready of a grid for as long as the grid lives.
 #[derive(Debug, Default)]
 pub struct CellRenderer {
@@ -253,33 +263,6 @@ impl CellRenderer {
         let jobs = Jobs { queues: queues(&frame, count, options.spread), progress };
         let gathered = options.engine.run(&frame, manner, jobs)?;
         Ok(ready.picture(gathered, options))
-    }
-
-    /// Does the part of one worker of a group, each in a process of its own with the same grid, and all with the same
-    /// arguments but the link. The first has the picture; the others have nothing.
-    ///
-    /// # Errors
-    /// All of [`CellsError`].
-    pub fn render_as(
-        &mut self,
-        item: &CellItem,
-        camera: &Camera,
-        size: [u32; 2],
-        options: &Options,
-        breaks: Breaks<'_>,
-        link: impl Link,
-    ) -> Result<Option<CellPicture>, CellsError> {
-        let ready = self.ready(item, camera, size, options, breaks)?;
-        let (frame, manner) = (ready.frame(), ready.manner(options));
-        let (rank, count) = (link.rank(), link.size());
-        if rank >= count || count > MAX_WORKERS {
-            return Err(CellsError::Workers);
-        }
-        let mut queues = queues(&frame, count, options.spread);
-        let left = queues.iter().map(|q| q.len() as u32).collect();
-        let queue = std::mem::take(&mut queues[rank]);
-        let gathered = engine::run(Worker::new(&frame, manner, link, queue, left), || true)?;
-        Ok((rank == 0).then(|| ready.picture(gathered, options)))
     }
 
     /// Checks what is asked for, and makes ready what is not.
@@ -326,7 +309,7 @@ impl CellRenderer {
     }
 
     /// Makes ready what is not of grids and their scalars, and lets go of scalars that are not asked for.
-    fn prepare(&mut self, items: &[CellItem]) -> Result<Vec<(Arc<Clusters>, Arc<Scalars>)>, CellsError> {
+    fn prepare(&mut self, items: &[CellItem]) -> Result<Vec<Prepared>, CellsError> {
         self.kept.retain(|kept| kept.grid.strong_count() > 0);
         let is_of = |item: &CellItem, grid: &Weak<CellGrid>| grid.as_ptr() == Arc::as_ptr(&item.grid);
         for Kept { grid, scalars, .. } in &mut self.kept {

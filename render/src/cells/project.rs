@@ -215,7 +215,7 @@ impl Projector {
     #[inline(always)]
     fn place(&mut self, frame: &Frame<'_>, cluster: usize) {
         let of_points = frame.scalars.place() == Place::Points;
-        let raw = frame.scalars.of(frame.clusters, cluster);
+        let raw = frame.scalars.of(cluster);
         self.values.clear();
         self.values.extend(raw.iter().map(|&v| frame.table.position(v)));
         self.corners.clear();
@@ -291,7 +291,7 @@ impl Projector {
     ) {
         self.shown.clear();
         let of_points = frame.scalars.place() == Place::Points;
-        let raw = frame.scalars.of(frame.clusters, cluster);
+        let raw = frame.scalars.of(cluster);
         for (index, tetrahedron) in frame.clusters.tetrahedra(cluster).iter().enumerate() {
             let corners = tetrahedron.map(|v| &self.corners[v as usize]);
             let values = if of_points { tetrahedron.map(|v| raw[v as usize]) } else { [raw[index]; 4] };

@@ -23,12 +23,16 @@ pub struct Counts {
     pub overlaps: u64,
     /// Bytes sent to other workers.
     pub bytes: u64,
+    /// Of these, bytes of cells and values that another worker had not got.
+    pub cell_bytes: u64,
     /// Messages sent to other workers.
     pub messages: u64,
     /// Clusters taken over from other workers.
     pub taken: u64,
     /// Clusters drawn.
     pub clusters: u64,
+    /// Tetrahedra that the worker's process has in memory; all of the grid where workers share it.
+    pub held: u64,
     /// Pixels in which runs of different clusters overlapped.
     pub overlapping_pixels: u64,
 }
@@ -42,7 +46,7 @@ impl Counts {
     /// What scan-converting a cell costs, beside its segments; segments.
     pub const CELL: u64 = 4;
 
-    fn fields(&mut self) -> [&mut u64; 14] {
+    fn fields(&mut self) -> [&mut u64; 16] {
         [
             &mut self.outside,
             &mut self.clear,
@@ -54,9 +58,11 @@ impl Counts {
             &mut self.merged,
             &mut self.overlaps,
             &mut self.bytes,
+            &mut self.cell_bytes,
             &mut self.messages,
             &mut self.taken,
             &mut self.clusters,
+            &mut self.held,
             &mut self.overlapping_pixels,
         ]
     }

@@ -11,6 +11,7 @@
 //! Without early termination lists keep the runs of each cluster apart until they are complete and in order, so that the
 //! same bytes come from any number of workers.
 
+use super::clusters::Pack;
 use super::early::{self, Early};
 use super::fold::{Segment, add_up, merge, overlap, under};
 use super::link::{Link, LinkError};
@@ -20,7 +21,7 @@ use super::stats::Counts;
 use super::wire::Message;
 
 /// What workers do about each other.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Manner {
     pub(super) early: Option<Early>,
     /// Pixels that a subscreen is wide.
@@ -28,6 +29,17 @@ pub(super) struct Manner {
     pub(super) share: bool,
     pub(super) balance: bool,
     pub(super) keep: bool,
+}
+
+/// What a worker begins with.
+#[derive(Debug)]
+pub(super) struct Start<'a> {
+    /// Its clusters, nearest first.
+    pub(super) queue: Vec<u32>,
+    /// How many each worker has.
+    pub(super) left: Vec<u32>,
+    /// The worker that has each cluster's cells and values, beside the first, which has all; empty where all share them.
+    pub(super) homes: &'a [u32],
 }
 
 /// What a step came to.
@@ -72,6 +84,7 @@ pub(super) struct Worker<'a, L> {
     frame: &'a Frame<'a>,
     manner: Manner,
     link: L,
+    homes: &'a [u32],
     /// Clusters to do, the next one last.
     queue: Vec<u32>,
     lists: Lists,
@@ -93,14 +106,8 @@ pub(super) struct Worker<'a, L> {
 }
 
 impl<'a, L: Link> Worker<'a, L> {
-    /// A worker with clusters of its own, nearest first; `left` is how many each worker has.
-    pub(super) fn new(
-        frame: &'a Frame<'a>,
-        manner: Manner,
-        link: L,
-        mut queue: Vec<u32>,
-        left: Vec<u32>,
-    ) -> Self {
+    pub(super) fn new(frame: &'a Frame<'a>, manner: Manner, link: L, start: Start<'a>) -> Self {
+        let Start { mut queue, left, homes } = start;
         let [width, height] = frame.size.map(|n| n as usize);
         let workers = link.size();
         queue.reverse();
@@ -108,6 +115,7 @@ impl<'a, L: Link> Worker<'a, L> {
         Self {
             frame,
             manner,
+            homes,
             told: queue.len() as u32,
             queue,
             lists: Lists::new(width * height),
@@ -135,6 +143,13 @@ impl<'a, L: Link> Worker<'a, L> {
         &self.gathered.counts[self.link.rank()]
     }
 
+    /// How many clusters are left to do, as far as is known here.
+    pub(super) fn remaining(&self) -> usize {
+        let me = self.link.rank();
+        let others = self.left.iter().enumerate().filter(|&(rank, _)| rank != me);
+        self.queue.len() + others.map(|(_, &left)| left as usize).sum::<usize>()
+    }
+
     /// Waits for a message.
     pub(super) fn wait(&mut self) -> Result<(), LinkError> {
         self.link.wait()
@@ -142,6 +157,10 @@ impl<'a, L: Link> Worker<'a, L> {
 
     /// Does what can be done next.
     pub(super) fn step(&mut self) -> Result<Step, LinkError> {
+        if self.phase == Phase::Done {
+            // What comes now is not about this picture.
+            return Ok(Step::Done);
+        }
         while let Some((from, bytes)) = self.link.poll()? {
             let message = Message::from_bytes(&bytes).ok_or(LinkError::Message { rank: from })?;
             self.receive(from, message)?;
@@ -153,6 +172,7 @@ impl<'a, L: Link> Worker<'a, L> {
                 if !self.finished.iter().enumerate().all(|(rank, &f)| f || rank == me) {
                     return Ok(Step::Waiting);
                 }
+                self.count().held = self.frame.clusters.held();
                 self.phase = Phase::Exchange(0, false);
                 Ok(Step::Worked)
             }
@@ -166,12 +186,15 @@ impl<'a, L: Link> Worker<'a, L> {
         &mut self.gathered.counts[self.link.rank()]
     }
 
-    fn send(&mut self, to: usize, message: &Message) -> Result<(), LinkError> {
-        let bytes = message.to_bytes();
+    /// Sends a message; gives its length.
+    fn send(&mut self, to: usize, message: &Message) -> Result<u64, LinkError> {
+        let message = message.to_bytes();
+        let bytes = message.len() as u64;
         let counts = self.count();
-        counts.bytes += bytes.len() as u64;
+        counts.bytes += bytes;
         counts.messages += 1;
-        self.link.send(to, bytes)
+        self.link.send(to, message)?;
+        Ok(bytes)
     }
 
     fn send_all(&mut self, message: &Message) -> Result<(), LinkError> {
@@ -194,11 +217,18 @@ impl<'a, L: Link> Worker<'a, L> {
             }
             Message::Ask => {
                 let given = self.give();
+                let packs = self.packs(from, &given);
                 self.told = self.queue.len() as u32;
-                self.send(from, &Message::Work(given, self.queue.len() as u32))?;
+                let with_cells = !packs.is_empty();
+                let bytes = self.send(from, &Message::Work(given, self.told, packs))?;
+                if with_cells {
+                    self.count().cell_bytes += bytes;
+                }
             }
-            Message::Work(list, left) => {
-                if list.iter().any(|&cluster| cluster as usize >= self.frame.clusters.len()) {
+            Message::Work(list, left, packs) => {
+                let Frame { clusters, scalars, .. } = self.frame;
+                let unpacked = packs.into_iter().all(|pack| pack.unpack(clusters, scalars));
+                if !unpacked || !list.iter().all(|&cluster| scalars.has(clusters, cluster as usize)) {
                     return Err(nonsense);
                 }
                 self.asked = false;
@@ -238,6 +268,16 @@ impl<'a, L: Link> Worker<'a, L> {
             }
         }
         Ok(())
+    }
+
+    /// What another worker has not got of clusters.
+    fn packs(&self, to: usize, given: &[u32]) -> Vec<Pack> {
+        let Frame { clusters, scalars, .. } = self.frame;
+        let lacks = |cluster: u32| {
+            to > 0 && self.homes.get(cluster as usize).is_some_and(|&home| home as usize != to)
+        };
+        let lacking = given.iter().filter(|&&cluster| lacks(cluster));
+        lacking.map(|&cluster| Pack::of(clusters, scalars, cluster)).collect()
     }
 
     /// Every third of the clusters left, so that near and far ones go with it.

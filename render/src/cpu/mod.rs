@@ -42,7 +42,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use crate::cells::{self, Breaks, CellRenderer, CellsError, Early, Spans, Strip};
+use crate::cells::{self, Breaks, CellPicture, CellRenderer, CellsError, Early, Group, Link, Spans, Strip};
 use crate::image::FloatImage;
 use crate::renderer::{Quality, Stats};
 use crate::scene::{CameraError, CellItem, Scene, TextureFormat, VolumeItem, VolumeMode};
@@ -165,6 +165,31 @@ pub fn alone_shows(scene: &Scene) -> bool {
         || scene.volumes.iter().any(|item| item.mode != VolumeMode::Composite || item.labels.is_some())
 }
 
+/// The grid of a scene that has nothing else.
+fn grid_alone(scene: &Scene) -> Option<&CellItem> {
+    match (&scene.volumes[..], &scene.meshes[..], &scene.grids[..]) {
+        ([], [], [grid]) => Some(grid),
+        _ => None,
+    }
+}
+
+/// The picture of a grid that is alone; nothing where cells of it overlap, whose colours mix along their depth.
+fn picture_of_grid(drawn: CellPicture) -> Option<(FloatImage, Stats)> {
+    let cells = drawn.stats;
+    if cells.total.overlaps + cells.total.overlapping_pixels > 0 {
+        return None;
+    }
+    let stats = Stats {
+        frame_ms: cells.prepare_ms + cells.frame_ms,
+        prepare_ms: cells.prepare_ms,
+        tetrahedra: cells.tetrahedra,
+        tetrahedra_scanned: cells.total.scanned,
+        grid: Some(cells),
+        ..Stats::default()
+    };
+    Some((drawn.image, stats))
+}
+
 /// Draws scenes. Keeps what it knows of volumes from picture to picture.
 #[derive(Debug, Default)]
 pub struct CpuRenderer {
@@ -198,8 +223,8 @@ impl CpuRenderer {
     /// `progress` is told, from any thread, how much of the picture is done and of how much; as soon as it answers `false`
     /// the drawing stops.
     ///
-    /// An unstructured grid that is alone in the scene and of which no cells overlap is drawn by [`CellRenderer`], in drafts with early termination at what
-    /// a draft may leave out; such drafts depend on the threads' timing, within that.
+    /// An unstructured grid that is alone in the scene and of which no cells overlap is drawn by [`CellRenderer`], in drafts
+    /// with early termination at what a draft may leave out; such drafts depend on the threads' timing, within that.
     ///
     /// # Errors
     /// All of [`CpuError`].
@@ -210,11 +235,48 @@ impl CpuRenderer {
         quality: Quality,
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> Result<(FloatImage, Stats), CpuError> {
-        if let ([], [], [grid]) = (&scene.volumes[..], &scene.meshes[..], &scene.grids[..]) {
-            if let Some(drawn) = self.grid_alone(grid, scene, size, quality, progress)? {
-                return Ok(drawn);
+        if let Some(grid) = grid_alone(scene) {
+            let options = self.of_grids(quality);
+            let breaks = Breaks::default();
+            let drawn = self.cells.render(grid, &scene.camera, size, &options, breaks, progress)?;
+            if let Some(picture) = picture_of_grid(drawn) {
+                return Ok(picture);
             }
         }
+        self.walk_rays(scene, size, quality, progress)
+    }
+
+    /// Draws as [`CpuRenderer::render`] does, but an unstructured grid that is alone in the scene by all processes of a group.
+    /// What else there is, is drawn by this process.
+    ///
+    /// # Errors
+    /// All of [`CpuError`].
+    pub fn render_by<L: Link>(
+        &mut self,
+        group: &mut Group<L>,
+        scene: &Scene,
+        size: [u32; 2],
+        quality: Quality,
+        progress: &(dyn Fn(usize, usize) -> bool + Sync),
+    ) -> Result<(FloatImage, Stats), CpuError> {
+        if let Some(grid) = grid_alone(scene) {
+            let options = self.of_grids(quality);
+            let drawn = group.render(grid, &scene.camera, size, &options, Breaks::default(), progress)?;
+            if let Some(picture) = picture_of_grid(drawn) {
+                return Ok(picture);
+            }
+        }
+        self.walk_rays(scene, size, quality, progress)
+    }
+
+    /// Any scene, ray by ray.
+    fn walk_rays(
+        &mut self,
+        scene: &Scene,
+        size: [u32; 2],
+        quality: Quality,
+        progress: &(dyn Fn(usize, usize) -> bool + Sync),
+    ) -> Result<(FloatImage, Stats), CpuError> {
         let begin = Instant::now();
         let [width, height] = size;
         let too_large = CpuError::Size { width, height };
@@ -228,7 +290,7 @@ impl CpuRenderer {
         let mut stats = Stats::default();
         let view = View::new(&scene.camera, size)?;
         let wide = self.instructions == Instructions::Best && has_wide();
-        let grids = self.cells.place(&scene.grids, &view, self.skips.empty, wide)?;
+        let grids = self.cells.place(&scene.grids, &view, &self.of_grids(quality))?;
         let ready = self.ready(scene, &mut stats);
         let placed = place(scene, &self.kept, &ready, &view, &mut stats);
         let rays = placed.rays;
@@ -294,36 +356,16 @@ impl CpuRenderer {
         Ok((FloatImage { width, height, pixels }, stats))
     }
 
-    /// A scene of one grid and nothing else; nothing where cells of it overlap, whose colours mix along their depth.
-    fn grid_alone(
-        &mut self,
-        grid: &CellItem,
-        scene: &Scene,
-        size: [u32; 2],
-        quality: Quality,
-        progress: &(dyn Fn(usize, usize) -> bool + Sync),
-    ) -> Result<Option<(FloatImage, Stats)>, CpuError> {
+    /// How a grid that is alone is drawn.
+    fn of_grids(&self, quality: Quality) -> cells::Options {
         let dark = f64::from(self.dark(quality));
         let ends_early = quality == Quality::Draft && dark > 0.0;
-        let options = cells::Options {
+        cells::Options {
             early: ends_early.then(|| Early { threshold: 1.0 - dark, ..Early::default() }),
             skip_clear: self.skips.empty,
             wide: self.instructions == Instructions::Best,
             ..cells::Options::default()
-        };
-        let drawn = self.cells.render(grid, &scene.camera, size, &options, Breaks::default(), progress)?;
-        let cells = &drawn.stats;
-        if cells.total.overlaps + cells.total.overlapping_pixels > 0 {
-            return Ok(None);
         }
-        let stats = Stats {
-            frame_ms: cells.prepare_ms + cells.frame_ms,
-            prepare_ms: cells.prepare_ms,
-            tetrahedra: cells.tetrahedra,
-            tetrahedra_scanned: cells.total.scanned,
-            ..Stats::default()
-        };
-        Ok(Some((drawn.image, stats)))
     }
 
     /// What may be left out behind a pixel falls with the error of the steps, which goes with their square.

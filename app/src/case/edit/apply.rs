@@ -92,12 +92,7 @@ pub fn apply(case: &mut Case, edit: Edit) -> Result<(), EditError> {
             fragments::split_volume(case, &volume, &cutters, &corners)?;
         }
         Edit::SplitFragment { id, cutter, corners } => fragments::split(case, &id, &cutter, &corners)?,
-        Edit::Fuse { ids, corners } => {
-            fragments::fuse(case, &ids, &corners)?;
-            if let Some((first, others)) = ids.split_first() {
-                others.iter().for_each(|other| grids::follow(case, other, first));
-            }
-        }
+        Edit::Fuse { ids, corners } => fragments::fuse(case, &ids, &corners)?,
         Edit::Unsplit { volume } => {
             volume_mut(case, &volume)?;
             case.fragments.retain(|f| f.volume != volume);

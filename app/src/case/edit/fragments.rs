@@ -6,7 +6,7 @@ use render::volume::{Affine, Cutter, Point, Side};
 
 use super::EditError;
 use super::apply::{cutter_mut, fragment_mut, volume_mut};
-use crate::case::{Case, Fragment, NamedCutter, split};
+use crate::case::{Case, Fragment, NamedCutter, grids, split};
 
 pub(super) fn split_volume(
     case: &mut Case,
@@ -32,6 +32,7 @@ pub(super) fn split_volume(
         keeps.iter().map(|keep| before.iter().find(|f| f.keep == *keep).cloned()).collect();
     let mut taken: Vec<String> =
         case.fragments.iter().chain(stay.iter().flatten()).map(|f| f.id.clone()).collect();
+    let stays: Vec<String> = stay.iter().flatten().map(|f| f.id.clone()).collect();
     for (number, (keep, same)) in keeps.into_iter().zip(stay).enumerate() {
         let fragment = same.unwrap_or_else(|| {
             let wish = format!("{volume}-{}", number + 1);
@@ -41,6 +42,9 @@ pub(super) fn split_volume(
             let mut fragment = Fragment::new(id, volume, keep);
             if let Some(parent) = parent {
                 (fragment.pose, fragment.visible) = (parent.pose, parent.visible);
+                if !stays.contains(&parent.id) {
+                    grids::follow(case, &parent.id, &fragment.id);
+                }
             }
             fragment
         });
@@ -78,6 +82,9 @@ pub(super) fn split(case: &mut Case, id: &str, cutter: &str, corners: &[Point; 8
             Fragment { id: Case::free_id(&format!("{id}-{}", parts.len() + 1), taken), ..parent.clone() };
         part.keep.insert(own.id.clone(), side);
         parts.push(part);
+    }
+    if let Some(part) = parts.first() {
+        grids::follow(case, id, &part.id);
     }
     if let Some(at) = case.fragments.iter().position(|f| f.id == id) {
         case.fragments.splice(at..=at, parts);
@@ -119,5 +126,8 @@ pub(super) fn fuse(case: &mut Case, ids: &[String], corners: &[Point; 8]) -> Res
     let id = first.id.clone();
     fragment_mut(case, &id)?.keep = keep;
     case.fragments.retain(|f| f.id == id || !ids.contains(&f.id));
+    for other in ids {
+        grids::follow(case, other, &id);
+    }
     Ok(())
 }

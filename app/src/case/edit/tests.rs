@@ -349,6 +349,16 @@ fn a_grid_rides_on_a_fragment_as_long_as_there_is_one() {
     apply(&mut case, ride(&first)).expect("rides");
     apply(&mut case, Edit::RenameFragment { id: first, to: "x".to_owned() }).expect("renamed");
     assert_eq!(rides_on(&case).as_deref(), Some("x"), "it follows the name");
+    let halved = Edit::SplitFragment { id: "x".to_owned(), cutter: "y".to_owned(), corners: corners() };
+    apply(&mut case, halved).expect("two halves");
+    assert_eq!(rides_on(&case).as_deref(), Some("x-1"), "it stays with a half");
+    split(&mut case, &["x"]).expect("as before the halves");
+    assert_eq!(rides_on(&case), None, "no half is left");
+    let first = case.fragments[0].id.clone();
+    apply(&mut case, ride(&first)).expect("rides");
+    split(&mut case, &["x", "y"]).expect("finer");
+    let on = rides_on(&case).expect("a part of what it rode on");
+    assert!(case.fragment(&on).is_some(), "that is there");
     let volume = case.fragments[0].volume.clone();
     apply(&mut case, Edit::Unsplit { volume }).expect("whole again");
     assert_eq!(rides_on(&case), None, "the fragment is gone");
@@ -357,10 +367,10 @@ fn a_grid_rides_on_a_fragment_as_long_as_there_is_one() {
         (GridChange::Scale(0.0), "a scale of nothing"),
         (GridChange::Rename(String::new()), "no name"),
         (
-            GridChange::Pose(
+            GridChange::Pose(Box::new(
                 Affine::from_columns(Vector::x() * 2.0, Vector::y(), Vector::z(), Point::origin())
                     .expect("a matrix"),
-            ),
+            )),
             "a pose that scales",
         ),
     ] {

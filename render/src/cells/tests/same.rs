@@ -1,7 +1,6 @@
 //! The same bytes however it is done; early termination within its bound; workers that fail.
 
 use super::*;
-use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 const SIZE: [u32; 2] = [56, 50];
@@ -205,51 +204,195 @@ impl Link for Channels {
     }
 
     fn wait(&mut self) -> Result<(), LinkError> {
-        let wait = std::time::Duration::from_secs(2);
+        // The others hear from the first that it is over.
+        let wait = std::time::Duration::from_secs(if self.rank == 0 { 2 } else { 60 });
         self.held = Some(self.from.recv_timeout(wait).map_err(|_none| LinkError::Lost { rank: 1 })?);
         Ok(())
     }
 }
 
-/// What each worker of a group comes to.
-fn group(count: usize, lasts: usize) -> Vec<Result<Option<CellPicture>, CellsError>> {
-    let (item, camera) = scene(6);
-    let results = Mutex::new(Vec::new());
+/// Loses its first message.
+struct Forgetful(Channels, bool);
+
+impl Link for Forgetful {
+    fn rank(&self) -> usize {
+        self.0.rank()
+    }
+
+    fn size(&self) -> usize {
+        self.0.size()
+    }
+
+    fn send(&mut self, to: usize, message: Vec<u8>) -> Result<(), LinkError> {
+        self.0.send(to, message)
+    }
+
+    fn poll(&mut self) -> Result<Option<(usize, Vec<u8>)>, LinkError> {
+        let found = self.0.poll()?;
+        Ok(if found.is_some() && std::mem::take(&mut self.1) { None } else { found })
+    }
+
+    fn wait(&mut self) -> Result<(), LinkError> {
+        self.0.wait()
+    }
+}
+
+/// What becomes of each process of a group: the first does something, and the others serve.
+fn group<T: Send>(
+    count: usize,
+    lasts: usize,
+    first: impl FnOnce(&mut Group<Channels>) -> T + Send,
+) -> (T, Vec<Result<(), CellsError>>) {
     std::thread::scope(|scope| {
-        for link in Channels::group(count, lasts) {
-            let (item, camera, results) = (&item, &camera, &results);
-            scope.spawn(move || {
-                let rank = link.rank;
-                let options = Options { keep_segments: true, ..Options::default() };
-                let mut renderer = CellRenderer::new();
-                let result = renderer.render_as(item, camera, SIZE, &options, Breaks::default(), link);
-                results.lock().expect("no panic").push((rank, result));
-            });
-        }
-    });
-    let mut results = results.into_inner().expect("no panic");
-    results.sort_by_key(|r| r.0);
-    results.into_iter().map(|r| r.1).collect()
+        let mut links = Channels::group(count, lasts).into_iter();
+        let link = links.next().expect("the first");
+        let others: Vec<_> = links
+            .map(|link| {
+                scope.spawn(move || Group::join(link).map(|group| assert!(group.is_none(), "serves")))
+            })
+            .collect();
+        let mut group = Group::join(link).expect("no error").expect("the first");
+        let result = first(&mut group);
+        drop(group);
+        (result, others.into_iter().map(|other| other.join().expect("no panic")).collect())
+    })
+}
+
+fn keeping() -> Options {
+    Options { keep_segments: true, ..Options::default() }
+}
+
+/// What a group draws.
+fn drawn(
+    group: &mut Group<Channels>,
+    item: &CellItem,
+    camera: &Camera,
+    options: &Options,
+) -> Result<CellPicture, CellsError> {
+    group.render(item, camera, SIZE, options, Breaks::default(), &|_, _| true)
 }
 
 #[test]
-fn workers_behind_a_link_of_ones_own_give_the_same_bytes() {
+fn processes_that_have_only_their_part_give_the_same_bytes() {
     let (item, camera) = scene(6);
     let known = draw(&item, &camera, SIZE, &workers(1, Engine::Threads));
-    for count in [1, 2, 3, 6] {
-        let results = group(count, usize::MAX);
-        let first = results[0].as_ref().expect("no error").as_ref().expect("the first has it");
-        assert!(first.image == known.image && first.segments == known.segments, "{count} workers");
-        assert!(results[1..].iter().all(|r| matches!(r, Ok(None))), "the others have nothing");
+    for count in [1, 2, 3, 4, 6, 8] {
+        for (spread, balance) in [(Spread::Columns, true), (Spread::Blocks, true), (Spread::Blocks, false)] {
+            let options = Options { spread, balance, ..keeping() };
+            let (picture, others) = group(count, usize::MAX, |group| drawn(group, &item, &camera, &options));
+            let picture = picture.expect("a picture");
+            assert!(picture.image == known.image && picture.segments == known.segments, "{count} processes");
+            assert!(others.iter().all(Result::is_ok), "all end well: {others:?}");
+            let all = picture.stats.tetrahedra;
+            let held: Vec<u64> = picture.stats.workers.iter().map(|w| w.held).collect();
+            assert_eq!(held[0], all, "the first has all");
+            if count > 2 && !balance {
+                assert!(held[1..].iter().sum::<u64>() < all, "the others have their parts: {held:?}");
+            }
+            assert_eq!(picture.stats.total.clusters, known.stats.total.clusters, "each cluster once");
+            assert_eq!(picture.stats.total.cell_bytes > 0, count > 1, "cells are sent");
+        }
     }
+}
+
+#[test]
+fn other_views_scalars_and_grids_follow_each_other_and_only_what_is_lacking_is_sent() {
+    let (first, camera) = scene(6);
+    let (second, _) = scene(5);
+    let values = |place, n: usize| (place, (0..n).map(|i| (i % 7) as f64 / 7.0).collect::<Vec<_>>());
+    let (_, of_cells) = values(Place::Cells, first.grid.len());
+    let mut step = first.grid.steps()[0].clone();
+    step.cell_fields = vec![Field::new("s".to_owned(), 1, Values::F64(of_cells))];
+    let grid = Arc::new((*first.grid).clone().with_steps(vec![step]).expect("a grid"));
+    let first = CellItem { grid, ..first };
+    let cells = CellItem { scalar: on(Place::Cells), ..first.clone() };
+    let aside = looks([-9.0, 2.0, 11.0], [3.0; 3], Projection::Parallel { height_mm: 9.0 });
+    let blocks = Options { spread: Spread::Blocks, balance: false, ..keeping() };
+    let (bytes, others) = group(4, usize::MAX, |group| {
+        let mut bytes = Vec::new();
+        for (item, camera, options) in [
+            (&first, &camera, &blocks),
+            (&first, &aside, &blocks),
+            (&cells, &camera, &blocks),
+            (&cells, &camera, &keeping()),
+            (&first, &aside, &keeping()),
+            (&second, &camera, &keeping()),
+            (&first, &camera, &Options { early: Some(Early::default()), ..keeping() }),
+            (&first, &camera, &keeping()),
+        ] {
+            let picture = drawn(group, item, camera, options).expect("a picture");
+            if options.early.is_none() {
+                let known = draw(item, camera, SIZE, &workers(1, Engine::Threads));
+                assert!(picture.image == known.image && picture.segments == known.segments, "{options:?}");
+            }
+            bytes.push(picture.stats.total.cell_bytes);
+        }
+        bytes
+    });
+    assert!(others.iter().all(Result::is_ok), "all end well: {others:?}");
+    assert!(bytes[0] > 0, "the grid is dealt out");
+    assert_eq!(bytes[1], 0, "and not again for another view");
+    assert!(bytes[2] > 0 && bytes[2] < bytes[0], "another scalar is less than the grid: {bytes:?}");
+}
+
+#[test]
+fn a_picture_can_be_given_up_and_another_drawn() {
+    let (item, camera) = scene(6);
+    let known = draw(&item, &camera, SIZE, &workers(1, Engine::Threads));
+    let ((), others) = group(4, usize::MAX, |group| {
+        for round in 0..20 {
+            let count = std::sync::atomic::AtomicUsize::new(0);
+            let goes_on =
+                |_: usize, _: usize| count.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < round;
+            let result = group.render(&item, &camera, SIZE, &keeping(), Breaks::default(), &goes_on);
+            // The others may have taken so much of the first's work that it was asked less often.
+            let stopped = count.into_inner() > round;
+            let expected = stopped.then_some(CellsError::Cancelled);
+            assert_eq!(result.err(), expected, "round {round}");
+            assert!(stopped || round > 3, "it is asked");
+            let wrong = CellItem { step: 7, ..item.clone() };
+            assert!(
+                matches!(drawn(group, &wrong, &camera, &keeping()), Err(CellsError::Step { .. })),
+                "asked"
+            );
+        }
+        let picture = drawn(group, &item, &camera, &keeping()).expect("a picture");
+        assert!(picture.image == known.image && picture.segments == known.segments, "as if nothing had been");
+    });
+    assert!(others.iter().all(Result::is_ok), "all end well: {others:?}");
 }
 
 #[test]
 fn a_worker_that_is_lost_is_an_error_and_no_hang() {
+    let (item, camera) = scene(6);
     for lasts in [0, 1, 3, 8] {
-        for result in group(4, lasts) {
-            let lost = matches!(result, Err(CellsError::Link(LinkError::Lost { .. })) | Ok(None));
-            assert!(lost, "no picture, but a clear end: {:?}", result.err());
+        let (results, others) = group(4, lasts, |group| {
+            [(); 2].map(|()| drawn(group, &item, &camera, &keeping()).map(|_picture| ()))
+        });
+        for result in &results {
+            assert!(matches!(result, Err(CellsError::Link(_))), "no picture, but a clear end: {result:?}");
         }
+        assert!(others[0].is_err(), "the one that fails knows it: {others:?}");
+        let ended = |result: &Result<(), CellsError>| matches!(result, Ok(()) | Err(CellsError::Link(_)));
+        assert!(others[1..].iter().all(ended), "the others end: {others:?}");
     }
+}
+
+#[test]
+fn a_worker_that_fails_says_why() {
+    let (item, camera) = scene(4);
+    let mut links = Channels::group(2, usize::MAX).into_iter();
+    let [first, second] = [links.next().expect("first"), links.next().expect("second")];
+    let second = Forgetful(second, true);
+    let (result, other) = std::thread::scope(|scope| {
+        let other = scope.spawn(move || Group::join(second).map(|_none| ()));
+        let mut group = Group::join(first).expect("no error").expect("the first");
+        let result = drawn(&mut group, &item, &camera, &keeping());
+        drop(group);
+        (result, other.join().expect("no panic"))
+    });
+    let fault = LinkError::Message { rank: 0 };
+    assert_eq!(other, Err(CellsError::Link(fault.clone())), "it knows");
+    let failed = LinkError::Failed { rank: 1, fault: fault.to_string() };
+    assert_eq!(result.err(), Some(CellsError::Link(failed)), "the first is told");
 }

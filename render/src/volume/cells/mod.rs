@@ -181,7 +181,8 @@ impl CellGrid {
         if u32::try_from(largest).is_err() {
             return Err(CellGridError::TooMany { count: largest });
         }
-        if let Some(point) = points.iter().position(|p| p.iter().any(|c| !(c.abs() <= FARTHEST_MM))) {
+        if let Some(point) = points.iter().position(|p| p.iter().any(|c| c.is_nan() || c.abs() > FARTHEST_MM))
+        {
             return Err(CellGridError::NotFinite { point });
         }
         let needed = kinds.iter().map(|kind| kind.corners()).sum();

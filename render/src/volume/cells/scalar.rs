@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn a_scalar_is_shown_before_a_vector_and_points_before_cells() {
-        let vector = || Field::new("u".to_owned(), 3, Values::F32(vec![1.0, -2.0, 2.0].repeat(4)));
+        let vector = || Field::new("u".to_owned(), 3, Values::F32([1.0, -2.0, 2.0].repeat(4)));
         let on_points = || Field::new("p".to_owned(), 1, Values::F32(vec![1.0, 2.0, f32::NAN, 4.0]));
         let on_cells = || Field::new("q".to_owned(), 1, Values::F32(vec![7.0]));
         let first = |a, b| grid(a, b).first_scalar();
