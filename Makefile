@@ -25,3 +25,4 @@ run:
 test:
 	@.ci/setup test
 	cargo test --workspace --locked
+	@.ci/ranks

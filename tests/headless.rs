@@ -6,7 +6,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use crate::support::compare::{colours, difference, open_rgb};
-use crate::support::program::{Outcome, run};
+use crate::support::program::{Outcome, run, run_as};
 use crate::support::{cases, gpu_wanted};
 
 /// Software rendering in a development build on a busy machine.
@@ -40,6 +40,24 @@ fn help_and_version_are_asked_for_and_succeed() {
     }
     let version = osteotome(&["--version"]);
     assert_eq!((version.code(), version.stdout.trim()), (0, "osteotome 0.1.0"), "the version");
+}
+
+#[test]
+fn a_program_without_mpi_does_not_do_everything_as_often_as_there_are_processes() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("picture.png");
+    let render = ["render", "no-such-case.json", "--out", text(&out)];
+    let outcome = run_as(0, 4, &render, LIMIT);
+    assert_error(&outcome, 2, "--features mpi");
+    let outcome = run_as(0, 4, &["info", "no-such-file"], LIMIT);
+    assert_error(&outcome, 2, "only render");
+    // One says it for all.
+    for args in [&render[..], &["info", "no-such-file"]] {
+        let outcome = run_as(2, 4, args, LIMIT);
+        assert_eq!((outcome.code(), outcome.stderr.as_str()), (0, ""), "{args:?}");
+    }
+    assert_error(&run_as(0, 1, &render, LIMIT), 3, "no-such-case.json");
+    assert!(!out.exists(), "no picture");
 }
 
 #[test]

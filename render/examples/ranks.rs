@@ -8,11 +8,9 @@ use std::process::{Command, ExitCode};
 use std::sync::Arc;
 
 use render::cells::mpi::MpiLink;
-use render::cells::{
-    Breaks, CellItem, CellPicture, CellRenderer, Group, Link, LinkError, Options, Part, Scalar, Spread,
-};
-use render::scene::{Camera, Projection};
-use render::volume::cells::{CellGrid, CellKind, Field, Place, Step, Values};
+use render::cells::{Breaks, CellPicture, CellRenderer, Group, Link, LinkError, Options, Spread};
+use render::scene::{Camera, CellItem, Projection};
+use render::volume::cells::{CellGrid, CellKind, Field, Part, Place, Scalar, Step, Values};
 use render::volume::{Affine, ControlPoint, Point, Transfer, Vector};
 
 const SIZE: [u32; 2] = [160, 120];

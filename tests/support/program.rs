@@ -55,6 +55,14 @@ pub(crate) fn run(args: &[&str], limit: Duration) -> Outcome {
     finish(&mut command, args, limit)
 }
 
+/// As [`run`], as if `mpirun` had started it as that one of so many processes.
+pub(crate) fn run_as(rank: usize, processes: usize, args: &[&str], limit: Duration) -> Outcome {
+    let mut command = Command::new(PROGRAM);
+    let [rank, processes] = [rank, processes].map(|n| n.to_string());
+    command.env("OMPI_COMM_WORLD_RANK", rank).env("OMPI_COMM_WORLD_SIZE", processes).args(args);
+    finish(&mut command, args, limit)
+}
+
 /// As [`run`], with no more than `bytes` of address space: what asks for more is refused and shows as a crash.
 pub(crate) fn run_within(args: &[&str], limit: Duration, bytes: u64) -> Outcome {
     if !cfg!(target_os = "linux") {

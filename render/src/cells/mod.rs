@@ -14,6 +14,8 @@
 //! 5. `worker`, `wire`, `link`, `engine`: workers share out clusters and exchange lists, by messages ([`Link`]); then the
 //!    lists are composited in order of depth. Grids may be of several parts, not convex, and cells may lie in a circle before
 //!    each other.
+//! 6. `group`, `serve`, `orders`: the same workers as processes, each with no more than its part of the grid ([`Group`]); over
+//!    MPI where the feature `mpi` is on.
 //!
 //! **Meaning**: that of `crate::reference`. The scalar is linear within each tetrahedron; fields of cells are constant
 //! within each cell. Cells with a value that is not a number are left out, and counted. Where cells overlap, their optical
