@@ -19,6 +19,15 @@ pub struct Faults {
     pub inverted: u64,
 }
 
+impl Faults {
+    /// Those of a grid.
+    pub fn of(grid: &CellGrid) -> Self {
+        let mut faults = Self::default();
+        parts(grid, &mut faults);
+        faults
+    }
+}
+
 /// Cells of a grid, ready to be drawn from anywhere.
 #[derive(Debug)]
 pub(super) struct Clusters {

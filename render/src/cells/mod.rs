@@ -52,6 +52,7 @@ pub use engine::Engine;
 pub use fold::Segment;
 pub use link::{Link, LinkError};
 pub use project::Breaks;
+pub(crate) use split::tetrahedra;
 pub use spread::Spread;
 pub use stats::{Counts, Stats};
 
