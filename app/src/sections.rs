@@ -43,7 +43,7 @@ pub struct ShownGrid {
     pub item: CellItem,
     /// The name of its scalar.
     pub title: String,
-    /// What the scalar is measured in, with a space before it; may be empty.
+    /// What the scalar is measured in; may be empty.
     pub unit: String,
 }
 
@@ -58,8 +58,7 @@ impl ShownGrid {
 pub fn grid(case: &Case, grid: &UnstructuredGrid, assets: &Assets) -> Option<ShownGrid> {
     let item = scene::grid(case, grid, assets)?;
     let title = scalar_title(&item.scalar, &item.grid);
-    let unit = if grid.unit.is_empty() { String::new() } else { format!(" {}", grid.unit) };
-    Some(ShownGrid { id: grid.id.clone(), item, title, unit })
+    Some(ShownGrid { id: grid.id.clone(), item, title, unit: grid.unit.clone() })
 }
 
 /// The visible grids, in the order of the case.

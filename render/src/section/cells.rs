@@ -219,3 +219,63 @@ pub fn cell_value(item: &CellItem, p: &Point) -> Option<f64> {
     };
     (0..item.grid.len()).into_par_iter().with_min_len(CELLS).find_map_first(in_cell)
 }
+
+/// A stretch of a ray in one tetrahedron of a grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CellSpan {
+    /// Where the ray enters it and leaves it; along the ray, in lengths of its direction.
+    pub reach: [f64; 2],
+    /// The scalar there; linear between.
+    pub values: [f64; 2],
+}
+
+impl CellSpan {
+    /// The scalar at a place along the ray within the stretch.
+    pub fn value(&self, at: f64) -> f64 {
+        let [from, to] = self.reach;
+        self.values[0] + (self.values[1] - self.values[0]) * ((at - from) / (to - from)).clamp(0.0, 1.0)
+    }
+}
+
+/// Where a ray from a world place is in the cells of a grid, in the grid's order; nothing behind its start.
+pub fn cell_spans(item: &CellItem, origin: &Point, direction: &Vector) -> Vec<CellSpan> {
+    let Some(scalars) = Scalars::of(item) else { return Vec::new() };
+    let back = item.pose.inverse();
+    // Not normalised, so that lengths along it stay what they are.
+    let (origin, direction) = (back.point(origin).coords, back.vector(direction));
+    let points = item.grid.points();
+    let in_cell = |cell: usize| {
+        let mut found = Vec::new();
+        let corners = || item.grid.cell(cell).1.iter().map(|&n| points[n as usize].coords - origin);
+        // The ball about the first corner that has the others.
+        let first = corners().next().unwrap_or_default();
+        let radius = corners().map(|c| (c - first).norm_squared()).fold(0.0, f64::max);
+        let beside = first - direction * (first.dot(&direction) / direction.norm_squared());
+        if beside.norm_squared() > radius * (1.0 + 1e-9) {
+            return found;
+        }
+        scalars.tetrahedra(cell, |numbers, values| {
+            let corners = numbers.map(|n| points[n].coords);
+            let Some(weights) = weights(corners) else { return };
+            let start: [f64; 3] = (weights * (origin - corners[0])).into();
+            let slope: [f64; 3] = (weights * direction).into();
+            let all = |w: [f64; 3], whole: f64| [whole - (w[0] + w[1] + w[2]), w[0], w[1], w[2]];
+            let (mut from, mut to) = (0.0_f64, f64::INFINITY);
+            for (w, s) in all(start, 1.0).into_iter().zip(all(slope, 0.0)) {
+                if s > 0.0 {
+                    from = from.max(-w / s);
+                } else if s < 0.0 {
+                    to = to.min(-w / s);
+                } else if w < 0.0 {
+                    return;
+                }
+            }
+            if from < to && to.is_finite() {
+                let at = |t: f64| value_of(values, std::array::from_fn(|k| start[k] + slope[k] * t));
+                found.push(CellSpan { reach: [from, to], values: [at(from), at(to)] });
+            }
+        });
+        found
+    };
+    (0..item.grid.len()).into_par_iter().with_min_len(CELLS).flat_map_iter(in_cell).collect()
+}

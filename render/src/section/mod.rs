@@ -38,7 +38,7 @@ mod tests;
 
 use thiserror::Error;
 
-pub use cells::{cell_value, cell_values};
+pub use cells::{CellSpan, cell_spans, cell_value, cell_values};
 pub use layer::Layer;
 pub use outline::{PieceLine, cutter_outline, mesh_outline, piece_outlines};
 pub use picture::{picture, values};

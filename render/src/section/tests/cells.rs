@@ -235,3 +235,42 @@ fn a_grid_is_one_more_layer_in_its_own_colours_where_it_is_not_clear() {
     let thick = section.with_slab(Slab { thickness_mm: 9.0, mode: SlabMode::Mip }).expect("a slab");
     assert_eq!(picture(&thick, &[], grids, [0.0, 0.0, 1.0]), alone, "of a thick section the middle plane");
 }
+
+#[test]
+fn the_stretches_of_a_ray_add_up_to_its_chord_and_carry_the_scalar() {
+    let linear = |p: &Point| 3.0 * p.x - 2.0 * p.y + 0.5 * p.z;
+    let mut dice = Dice(3);
+    for only in [CellKind::Hexahedron, CellKind::Wedge] {
+        // Twice as large, and 10 mm to the left.
+        let columns = [Vector::x() * 2.0, Vector::y() * 2.0, Vector::z() * 2.0];
+        let pose = Affine::from_columns(columns[0], columns[1], columns[2], Point::new(10.0, 0.0, 0.0));
+        let item = item(cubes(3, 0.2, Some(only), 4, linear), Place::Points, pose.expect("a pose"));
+        for _ in 0..200 {
+            let through = Point::new(13.0, 3.0, 3.0) + dice.vector() * 5.0;
+            let direction = dice.vector().try_normalize(1e-3).unwrap_or_else(Vector::x);
+            let origin = through - direction * 20.0;
+            // The chord of the box that all cells make.
+            let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+            for (axis, [low, high]) in [[10.0, 16.0], [0.0, 6.0], [0.0, 6.0]].into_iter().enumerate() {
+                let (a, b) =
+                    ((low - origin[axis]) / direction[axis], (high - origin[axis]) / direction[axis]);
+                (from, to) = (from.max(a.min(b)), to.min(a.max(b)));
+            }
+            let spans = cell_spans(&item, &origin, &direction);
+            let length: f64 = spans.iter().map(|s| s.reach[1] - s.reach[0]).sum();
+            assert!((length - (to - from)).abs() < 1e-9, "{only:?}: {length} of {}", to - from);
+            for span in &spans {
+                let middle = 0.5 * (span.reach[0] + span.reach[1]);
+                let own = item.pose.inverse().point(&(origin + direction * middle));
+                assert!(
+                    (cell_value(&item, &(origin + direction * middle)).expect("within") - span.value(middle))
+                        .abs()
+                        < 1e-9,
+                    "{own}"
+                );
+            }
+            let behind = cell_spans(&item, &(through + direction * 20.0), &direction);
+            assert_eq!(behind, [], "nothing behind its start");
+        }
+    }
+}
