@@ -503,3 +503,46 @@ fn a_section_shows_volumes_labels_and_the_lines_of_moved_fragments() {
     let oblique = section(&["--plane", "-1,1,0", "--at", "20,19,30"]);
     assert!(colours(&oblique) > 10, "an oblique section");
 }
+
+#[test]
+fn a_section_shows_a_grid_where_its_fragment_went_in_the_colours_of_its_scalar() {
+    let folder = tempfile::tempdir().unwrap();
+    cases::write_nrrd(&folder.path().join("flat.nrrd"), [40, 20, 20], 2.0, |_| 1000);
+    // A hexahedron of 0.02 m along each axis, whose scalar rises from 0 to 10 along x.
+    let corner = |i: usize| [[0, 0], [1, 0], [1, 1], [0, 1]][i % 4].map(|n| f64::from(n) * 0.02);
+    let points: Vec<String> = (0..8)
+        .map(|i| format!("{} {} {}", corner(i)[0], corner(i)[1], if i < 4 { 0.0 } else { 0.02 }))
+        .collect();
+    let text_of = format!(
+        "# vtk DataFile Version 3.0\nmade\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n{}\nCELLS 1 9\n\
+         8 0 1 2 3 4 5 6 7\nCELL_TYPES 1\n12\nPOINT_DATA 8\nSCALARS load double 1\nLOOKUP_TABLE default\n\
+         0 10 10 0 0 10 10 0\n",
+        points.join("\n")
+    );
+    std::fs::write(folder.path().join("load.vtk"), text_of).unwrap();
+    let case = json!({
+        "osteotome": 1, "name": "simulated",
+        "volumes": [{"id": "v", "source": "flat.nrrd", "blend": 0, "transfer": {"points": [[0, 1, 1, 1, 0.1]]}}],
+        "fragments": [{"id": "f", "volume": "v", "keep": {}, "pose": [1,0,0,0, 0,1,0,0, 0,0,1,30, 0,0,0,1]}],
+        "grids": [{"id": "g", "source": "load.vtk", "scale": 1000, "fragment": "f",
+            "transfer": {"points": [[2.5, 0, 1, 0, 0], [2.5, 0, 1, 0, 0.5], [10, 1, 0, 0, 0.5]]}}]
+    });
+    let case = cases::write_case(folder.path(), &case);
+    let picture = folder.path().join("s.png");
+    let place = ["--plane", "coronal", "--at", "20,10,40", "--size", "40x40", "--mm-per-pixel", "1"];
+    let arguments = [&["section", text(&case), "--out", text(&picture)][..], &place].concat();
+    let outcome = osteotome(&arguments);
+    assert_eq!(outcome.code(), 0, "{}", outcome.stderr);
+    let picture = open_rgb(&picture);
+    // Pixel (i, j) is at x = i + 0.5 and z = 59.5 - j; the grid lies from x = 0 to 20 and from z = 30 to 50.
+    let at = |x: u32, z: u32| picture.get_pixel(x, 59 - z).0;
+    assert_eq!(at(4, 40), [0, 0, 0], "clear below 2.5");
+    let [red, green, blue] = at(12, 40);
+    // x = 12.5 has 6.25, half way from green to red.
+    assert!(
+        red.abs_diff(128) <= 1 && green.abs_diff(128) <= 1 && blue == 0,
+        "half way: {red} {green} {blue}"
+    );
+    assert!(at(19, 49)[0] > 240 && at(19, 31)[0] > 240, "as high as the fragment went");
+    assert_eq!((at(21, 40), at(12, 51), at(12, 29)), ([0; 3], [0; 3], [0; 3]), "nothing beside it");
+}

@@ -69,6 +69,20 @@ pub const COLORMAPS: [Colormap; 5] = [
 pub const OPACITY: [f64; 2] = [0.06, 0.5];
 
 impl Colormap {
+    /// Whether a transfer function has these colours at even distances; its opacities do not matter.
+    pub fn is_of(&self, transfer: &Transfer) -> bool {
+        let points = transfer.points();
+        let (Some(first), Some(last)) = (points.first(), points.last()) else { return false };
+        let width = last.value - first.value;
+        let steps = (self.colors.len() - 1) as f64;
+        points.len() == self.colors.len()
+            && points.iter().zip(self.colors).enumerate().all(|(i, (point, color))| {
+                let value = first.value + width * i as f64 / steps;
+                (point.value - value).abs() <= 1e-9 * width
+                    && point.rgba[..3] == color.map(|c| f64::from(c) / 255.0)
+            })
+    }
+
     /// These colours over a range of values, with an opacity of `unit_mm` that rises evenly between two. A range without
     /// width, or not finite, counts as one unit wide.
     pub fn transfer(&self, [low, high]: [f64; 2], opacity: [f64; 2], unit_mm: f64) -> Transfer {
@@ -104,6 +118,8 @@ mod tests {
             assert_eq!((t.points()[0].value, t.rgba(30.0)[3], t.unit_mm()), (10.0, 0.5, 2.0), "{}", map.name);
             assert!((t.rgba(20.0)[3] - 0.3).abs() < 1e-12, "half way, {}", map.name);
             assert_ne!(t.rgba(10.0)[..3], t.rgba(30.0)[..3], "{} has two ends", map.name);
+            let same: Vec<&str> = COLORMAPS.iter().filter(|m| m.is_of(&t)).map(|m| m.name).collect();
+            assert_eq!(same, [map.name], "known again by its colours");
         }
         let t = COLORMAPS[0].transfer([f64::NAN, f64::INFINITY], [f64::NAN, 7.0], f64::NAN);
         assert_eq!((t.points()[0].value, t.unit_mm(), t.rgba(1.0)[3]), (0.0, 1.0, 1.0), "no range");

@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+pub use render::cells::Faults as CellFaults;
 use render::scene::{Camera, CellItem, Labels, MeshItem, Piece, Projection, Scene, VolumeItem};
 use render::volume::cells::{Scalar, Step};
 use render::volume::{Affine, CellGrid, Point, Transfer, Vector};
@@ -92,7 +93,8 @@ pub fn implant_cut(case: &Case, implant: &Implant, assets: &Assets) -> Option<Cu
     Some(assets.cuts().cut(&implant.id, mesh, &world_from_model(implant), case.sides(&implant.keep)))
 }
 
-fn grid(case: &Case, grid: &UnstructuredGrid, assets: &Assets) -> Option<CellItem> {
+/// An unstructured grid as it is drawn, where it is visible, loaded and has the scalar that it shows.
+pub fn grid(case: &Case, grid: &UnstructuredGrid, assets: &Assets) -> Option<CellItem> {
     if !grid.visible {
         return None;
     }

@@ -1,13 +1,14 @@
-//! From a case and its loaded data to what a section shows: layers, and lines over them. Pure: no files, no window.
+//! From a case and its loaded data to what a section shows: layers, grids, and lines over them. Pure: no files, no window.
 
 use std::collections::BTreeMap;
 
-use render::scene::Piece;
+use render::scene::{CellItem, Piece};
 use render::section::{self, Layer, Section, Window};
-use render::volume::{Grid, Point};
+use render::volume::cells::{Part, Scalar};
+use render::volume::{CellGrid, Grid, Point};
 
 use crate::case::assets::Key;
-use crate::case::{Assets, Case, Volume};
+use crate::case::{Assets, Case, UnstructuredGrid, Volume};
 use crate::scene;
 
 /// Values below this are air: only CT, in HU, stores such.
@@ -31,6 +32,56 @@ pub fn layers(case: &Case, assets: &Assets, windows: &BTreeMap<String, Window>) 
             labels: scene::labels(case, volume, assets),
         })
         .collect()
+}
+
+/// An unstructured grid as sections and colour bars show it.
+#[derive(Debug, Clone)]
+pub struct ShownGrid {
+    /// Its id.
+    pub id: String,
+    /// What is drawn.
+    pub item: CellItem,
+    /// The name of its scalar.
+    pub title: String,
+    /// What the scalar is measured in; may be empty.
+    pub unit: String,
+}
+
+impl ShownGrid {
+    /// The scalar at a world place; nothing where no cell is.
+    pub fn value(&self, p: &Point) -> Option<f64> {
+        section::cell_value(&self.item, p)
+    }
+}
+
+/// A grid as it is shown; nothing where it is hidden, not loaded or without the scalar that it should show.
+pub fn grid(case: &Case, grid: &UnstructuredGrid, assets: &Assets) -> Option<ShownGrid> {
+    let item = scene::grid(case, grid, assets)?;
+    let title = scalar_title(&item.scalar, &item.grid);
+    Some(ShownGrid { id: grid.id.clone(), item, title, unit: grid.unit.clone() })
+}
+
+/// The visible grids, in the order of the case.
+pub fn grids(case: &Case, assets: &Assets) -> Vec<ShownGrid> {
+    case.grids.iter().filter_map(|shown| grid(case, shown, assets)).collect()
+}
+
+/// A scalar's name for people: the field's, and what is shown of one of several components.
+pub fn scalar_title(scalar: &Scalar, cells: &CellGrid) -> String {
+    let field = cells.steps().first().and_then(|step| scalar.field(step));
+    match field.map_or(1, |f| f.components()) {
+        1 => scalar.name.clone(),
+        count => format!("{}, {}", scalar.name, part_title(scalar.part, count)),
+    }
+}
+
+/// What is shown of a field of so many components: `"magnitude"`, `"x"`, `"component 4"`.
+pub fn part_title(part: Part, components: usize) -> String {
+    match part {
+        Part::Magnitude => "magnitude".to_owned(),
+        Part::Component(c @ 0..3) if components == 3 => ["x", "y", "z"][c].to_owned(),
+        Part::Component(c) => format!("component {c}"),
+    }
 }
 
 /// The pieces of a volume that are drawn.

@@ -284,3 +284,10 @@ pub struct Scene {
     /// Display colour behind everything.
     pub background: [f64; 3],
 }
+
+impl Scene {
+    /// Whether there is nothing to draw.
+    pub fn is_empty(&self) -> bool {
+        self.volumes.is_empty() && self.meshes.is_empty() && self.grids.is_empty()
+    }
+}

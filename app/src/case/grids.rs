@@ -104,7 +104,7 @@ pub enum GridChange {
     Fragment(Option<String>),
     /// Whether it is drawn.
     Visible(bool),
-    /// Another scalar, with the default colours over its range and no unit.
+    /// Another scalar, with the default colours over its range, and without a unit where it is of another field.
     Field(Option<FieldChoice>),
     /// What the scalar is measured in.
     Unit(String),
@@ -148,8 +148,11 @@ pub(super) fn apply(case: &mut Case, id: &str, change: GridChange) -> Result<(),
         GridChange::Visible(visible) => case.grids[index].visible = visible,
         GridChange::Field(field) => {
             let grid = &mut case.grids[index];
+            let name = |choice: &Option<FieldChoice>| choice.as_ref().map(|f| f.name.clone());
+            if name(&field) != name(&grid.field) {
+                grid.unit.clear();
+            }
             (grid.field, grid.transfer) = (field, None);
-            grid.unit.clear();
         }
         GridChange::Unit(unit) => case.grids[index].unit = unit,
         GridChange::Transfer(transfer) => case.grids[index].transfer = transfer,

@@ -1,4 +1,4 @@
-//! `section`: a flat picture of a case through the original samples, with the lines of cutters and implants.
+//! `section`: a flat picture of a case through the original samples and cells, with the lines of cutters and implants.
 
 use std::collections::BTreeMap;
 
@@ -28,11 +28,11 @@ pub fn run(args: &SectionArgs) -> Result<(), Failure> {
     let layers = sections::layers(&input.case, &input.assets, &BTreeMap::new());
     let drawn = scene::scene(&input.case, &input.assets);
     let Some(bounds) = scene::bounds(&drawn) else {
-        let fault = "the case shows nothing; make a volume or an implant visible";
+        let fault = "the case shows nothing; make a volume, an implant or a grid visible";
         return Err(Failure::Unfit(format!("{fault}: {}", args.input.display())));
     };
     let section = section_of(args, bounds).map_err(|error| Failure::Usage(error.to_string()))?;
-    let mut bytes = section::picture(&section, &layers, input.case.background);
+    let mut bytes = section::picture(&section, &layers, &drawn.grids, input.case.background);
     let reach_mm = (bounds[1] - bounds[0]).norm() + (section.centre() - bounds[0]).norm();
     lines(&input, &layers, &section, reach_mm, &mut bytes);
     let mut file = Vec::new();

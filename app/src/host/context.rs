@@ -9,7 +9,7 @@ pub use render::section::{Slab, SlabMode, Window};
 use render::volume::Point;
 
 use super::views::{self, Views};
-use crate::case::{Assets, Case, Edit, Fragment, Implant, NamedCutter, Volume};
+use crate::case::{Assets, Case, Edit, Fragment, Implant, NamedCutter, UnstructuredGrid, Volume};
 
 /// What is chosen, by id. May name what an undo took away: ask through [`Selection::repair`]ed fields.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -22,6 +22,8 @@ pub struct Selection {
     pub fragment: Option<String>,
     /// The implant to move.
     pub implant: Option<String>,
+    /// The unstructured grid to look at.
+    pub grid: Option<String>,
     /// The cutters to split by.
     pub split_by: BTreeSet<String>,
 }
@@ -39,6 +41,7 @@ impl Selection {
         one(&mut self.cutter, case.cutters.iter().map(|c| c.id.as_str()));
         one(&mut self.fragment, case.fragments.iter().map(|f| f.id.as_str()));
         one(&mut self.implant, case.implants.iter().map(|i| i.id.as_str()));
+        one(&mut self.grid, case.grids.iter().map(|g| g.id.as_str()));
         self.split_by.retain(|id| case.cutter(id).is_some());
     }
 }
@@ -121,6 +124,11 @@ impl<'a> ToolContext<'a> {
     /// The chosen implant.
     pub fn implant(&self) -> Option<&'a Implant> {
         self.case.implant(self.selection.implant.as_deref()?)
+    }
+
+    /// The chosen unstructured grid.
+    pub fn grid(&self) -> Option<&'a UnstructuredGrid> {
+        self.case.grid(self.selection.grid.as_deref()?)
     }
 
     /// Where the sections cross, or the middle of everything.

@@ -27,9 +27,11 @@ use super::tool::ToolId;
 use super::viewport::Viewport;
 use super::views::{Orientation, ViewId, Views};
 use super::{help, layout, loss, pick};
+use crate::case::grids::GridChange;
 use crate::case::{Case, Edit, assets};
+use crate::scene;
+use crate::sections::{self, ShownGrid};
 use crate::ui::theme;
-use crate::{scene, sections};
 
 const UNDO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Z);
 const REDO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
@@ -185,6 +187,7 @@ impl Host {
         let mut wishes = Wishes::default();
         self.session.tick(now_secs);
         self.session.complain_of_steps();
+        self.session.complain_of_grids();
         if self.session.replaced() != self.replaced {
             self.replaced = self.session.replaced();
             self.views = Views::new();
@@ -331,11 +334,12 @@ impl Host {
         let ball = Ball::about(scene::bounds(&scene).into_iter().flatten());
         let layers = self.views.layers(self.session.case(), self.session.assets());
         let names = names(self.session.case(), self.session.assets());
+        let grids = sections::grids(self.session.case(), self.session.assets());
         for (view, rect) in layout::cells(area, self.views.only) {
             match view {
-                ViewId::Spatial => self.spatial_ui(ui, rect, &scene, ball, wishes),
+                ViewId::Spatial => self.spatial_ui(ui, rect, (&scene, &grids), ball, wishes),
                 ViewId::Section(orientation) => {
-                    self.section_ui(ui, (rect, orientation), ball, (&layers, &names), wishes);
+                    self.section_ui(ui, (rect, orientation), ball, (&layers, &names, &grids), wishes);
                 }
             }
         }
@@ -346,7 +350,7 @@ impl Host {
         ui: &mut Ui,
         (rect, orientation): (Rect, Orientation),
         ball: Ball,
-        (layers, names): (&[Layer], &[(String, String)]),
+        (layers, names, grids): (&[Layer], &[(String, String)], &[ShownGrid]),
         wishes: &mut Wishes,
     ) {
         let windowed = self.selection.volume.clone();
@@ -356,6 +360,7 @@ impl Host {
             assets: self.session.assets(),
             layers,
             names,
+            grids,
             windowed: windowed.as_deref(),
             ball,
             moving: ui.input(|i| i.pointer.any_down()),
@@ -378,7 +383,14 @@ impl Host {
         view.ui(ui, rect, orientation, &input, &mut context, &mut pass_on);
     }
 
-    fn spatial_ui(&mut self, ui: &mut Ui, rect: Rect, scene: &Scene, ball: Ball, wishes: &mut Wishes) {
+    fn spatial_ui(
+        &mut self,
+        ui: &mut Ui,
+        rect: Rect,
+        (scene, grids): (&Scene, &[ShownGrid]),
+        ball: Ball,
+        wishes: &mut Wishes,
+    ) {
         self.draw_picture(ui, rect, scene);
         let mut overlay = Overlay::default();
         let case = self.session.case();
@@ -390,7 +402,7 @@ impl Host {
         if let Some(tool) = &tool {
             tool.draw(&context, &mut overlay);
         }
-        let is_empty = scene.volumes.is_empty() && scene.meshes.is_empty();
+        let is_empty = scene.is_empty();
         let instead = if !self.picture.fault().is_empty() {
             self.picture.fault()
         } else if is_empty && self.session.is_idle() {
@@ -407,6 +419,7 @@ impl Host {
             instead,
             background: scene.background,
             overlay: &overlay,
+            grids,
         };
         let mut pass_on = |event: &PointerEvent| {
             let Some(tool) = &mut tool else { return false };
@@ -461,6 +474,9 @@ impl Host {
                 Edit::RenameCutter { to, .. } => self.selection.cutter = Some(to.clone()),
                 Edit::RenameFragment { to, .. } => self.selection.fragment = Some(to.clone()),
                 Edit::RenameImplant { to, .. } => self.selection.implant = Some(to.clone()),
+                Edit::ChangeGrid { change: GridChange::Rename(to), .. } => {
+                    self.selection.grid = Some(to.clone());
+                }
                 _ => {}
             }
             self.session.edit(edit, now_secs);

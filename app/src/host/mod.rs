@@ -13,6 +13,7 @@
 //! `OSTEOTOME_LOSE_GPU=N` gives up, closes the window, which opens again on another; see [`loss`].
 
 pub mod camera;
+mod color_bar;
 pub mod context;
 pub mod cube;
 pub mod dialogs;
@@ -28,6 +29,7 @@ pub mod pointer;
 pub mod processor;
 pub mod registry;
 pub mod screenshot;
+mod section_key;
 pub mod section_view;
 pub mod session;
 pub mod spatial_view;

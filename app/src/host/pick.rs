@@ -1,6 +1,7 @@
 //! What is seen at a place of the 3D picture: a walk along the ray on the CPU, through the original data.
 
 use render::scene::Scene;
+use render::section;
 use render::volume::{Affine, Point};
 
 use super::camera::{Ball, Ray};
@@ -18,18 +19,18 @@ struct Prepared<'a> {
     voxel_from_world: Affine,
 }
 
-/// The place along `ray` where half the light is stopped by the volumes, or the nearest opaque crossing
+/// The place along `ray` where half the light is stopped by the volumes and grids, or the nearest opaque crossing
 /// of a surface before it; `None` where one sees through.
 pub fn place(scene: &Scene, ball: Ball, ray: &Ray) -> Option<Point> {
-    let volume = volume_place(scene, ball, ray);
+    let soft = soft_place(scene, ball, ray);
     let surface = surface_distance(scene, ray);
-    match (volume, surface) {
+    match (soft, surface) {
         (Some(a), Some(b)) => Some(ray.at(a.min(b))),
         (a, b) => a.or(b).map(|d| ray.at(d)),
     }
 }
 
-fn volume_place(scene: &Scene, ball: Ball, ray: &Ray) -> Option<f64> {
+fn soft_place(scene: &Scene, ball: Ball, ray: &Ray) -> Option<f64> {
     let middle = (ball.centre - ray.origin).dot(&ray.direction);
     let start = (middle - ball.radius_mm * 1.5).max(0.0);
     let end = middle + ball.radius_mm * 1.5;
@@ -44,8 +45,10 @@ fn volume_place(scene: &Scene, ball: Ball, ray: &Ray) -> Option<f64> {
         })
     };
     let pieces: Vec<Prepared<'_>> = scene.volumes.iter().flat_map(prepare).collect();
+    let of_grids = grids_depth(scene, ray, start, step_mm);
     let mut through = 1.0_f64;
-    for step in 0..STEPS {
+    for (step, depth) in of_grids.into_iter().enumerate() {
+        through *= (-depth).exp();
         let distance = start + (step as f64 + 0.5) * step_mm;
         let p = ray.at(distance);
         for of in &pieces {
@@ -61,6 +64,25 @@ fn volume_place(scene: &Scene, ball: Ball, ray: &Ray) -> Option<f64> {
         }
     }
     None
+}
+
+/// The optical depth of the grids in each of the steps along the ray.
+fn grids_depth(scene: &Scene, ray: &Ray, start: f64, step_mm: f64) -> Vec<f64> {
+    let mut depth = vec![0.0; STEPS];
+    for item in &scene.grids {
+        for span in section::cell_spans(item, &ray.origin, &ray.direction) {
+            let [from, to] = span.reach;
+            let first = ((from - start) / step_mm).max(0.0) as usize;
+            let end = (((to - start) / step_mm).ceil().max(0.0) as usize).min(STEPS);
+            for step in first..end {
+                let begin = start + step as f64 * step_mm;
+                let (a, b) = (from.max(begin), to.min(begin + step_mm));
+                let (_, extinction) = item.transfer.classify(span.value(0.5 * (a + b)));
+                depth[step] += extinction * (b - a).max(0.0);
+            }
+        }
+    }
+    depth
 }
 
 /// Distance to the nearest crossing with a surface that stops at least half the light (Möller and
@@ -97,7 +119,8 @@ mod tests {
 
     use super::*;
     use crate::host::camera::Facing;
-    use render::scene::{MeshItem, Piece, Shading, TextureFormat, VolumeItem};
+    use render::scene::{CellItem, MeshItem, Piece, Shading, TextureFormat, VolumeItem};
+    use render::volume::cells::{CellGrid, CellKind, Field, Part, Place, Scalar, Step, Values};
     use render::volume::{ControlPoint, Grid, Rescale, Samples, Transfer, TriangleMesh, Vector};
 
     fn ball() -> Ball {
@@ -142,6 +165,32 @@ mod tests {
         scene.volumes[0].pieces[0].pose = Affine::translation(Vector::new(0.0, 5.0, 0.0));
         let p = place(&scene, ball(), &ray()).expect("met");
         assert!((p.y - 4.5).abs() < 0.2, "{p}");
+    }
+
+    #[test]
+    fn a_grid_is_met_where_it_stops_half_the_light() {
+        let field = Field::new("s".to_owned(), 1, Values::F64(vec![9.0]));
+        let step = Step { time: 0.0, point_fields: vec![], cell_fields: vec![field] };
+        let (a, b) = (0.0, 20.0);
+        let corners = [[a, a], [b, a], [b, b], [a, b]];
+        let points = [a, b].into_iter().flat_map(|z| corners.map(|[x, y]| Point::new(x, y, z))).collect();
+        let cells = CellGrid::new(points, vec![CellKind::Hexahedron], (0..8).collect(), vec![step]);
+        // A tenth of the light passes 10 mm.
+        let point = ControlPoint { value: 0.0, rgba: [1.0, 1.0, 1.0, 0.9] };
+        let mut scene = scene();
+        scene.volumes.clear();
+        scene.grids = vec![CellItem {
+            grid: Arc::new(cells.expect("cells")),
+            step: 0,
+            scalar: Scalar { place: Place::Cells, name: "s".to_owned(), part: Part::Component(0) },
+            pose: Affine::translation(Vector::new(0.0, 3.0, 0.0)),
+            transfer: Arc::new(Transfer::new(vec![point], 10.0).expect("transfer")),
+        }];
+        let p = place(&scene, ball(), &ray()).expect("met");
+        let known = 3.0 + 10.0 * 0.5_f64.log10().abs();
+        assert!((p - Point::new(7.0, known, 12.0)).norm() < 0.05, "{p}, not {known}");
+        let beside = Ray { origin: Point::new(7.0, -60.0, 21.0), ..ray() };
+        assert_eq!(place(&scene, ball(), &beside), None, "beside it");
     }
 
     #[test]

@@ -99,7 +99,7 @@ impl Picture {
     pub fn draw(&mut self, ctx: &Context, scene: &Scene, key: PictureKey, is_patient: bool) {
         self.take_in();
         let Some(viewport) = &mut self.viewport else { return };
-        if scene.volumes.is_empty() && scene.meshes.is_empty() {
+        if scene.is_empty() {
             return;
         }
         let (quality, scale) = match self.pacer.need(&key, ctx.input(|i| i.time)) {

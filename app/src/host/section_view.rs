@@ -10,48 +10,19 @@ use egui::{
     Align2, Color32, ColorImage, FontId, Painter, PointerButton, Pos2, Rect, Sense, Stroke, TextureHandle,
     TextureOptions, Ui, pos2, vec2,
 };
+use render::scene::CellItem;
 use render::section::{self, Layer, Section, SlabMode};
 use render::volume::{Point, TriangleMesh, Vector};
 
 use super::camera::{Ball, Facing};
 use super::context::ToolContext;
 use super::pointer::{Phase, SectionEvent};
+use super::section_key::Key;
 use super::turning::{DOT_REACH, crosshair_ui, turn, turning_dots};
 use super::views::{Orientation, ViewId, Views};
 use crate::case::{Assets, Case};
-use crate::sections;
-use crate::ui::theme;
-
-/// What a picture depends on; a layer's samples by the address of its grid, which is never changed.
-#[derive(Debug, Clone, PartialEq)]
-struct Key {
-    section: Section,
-    layers: Vec<LayerKey>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-struct LayerKey {
-    grid: usize,
-    pose: render::volume::Affine,
-    pieces: Vec<render::scene::Piece>,
-    window: section::Window,
-    weight: f64,
-    /// The address of the labels' grid, and their colours.
-    labels: Option<(usize, Arc<[[f64; 4]]>)>,
-}
-
-impl LayerKey {
-    fn of(layer: &Layer) -> Self {
-        Self {
-            grid: Arc::as_ptr(&layer.grid) as usize,
-            pose: layer.pose,
-            pieces: layer.pieces.clone(),
-            window: layer.window,
-            weight: layer.weight,
-            labels: layer.labels.as_ref().map(|l| (Arc::as_ptr(&l.grid) as usize, Arc::clone(&l.colors))),
-        }
-    }
-}
+use crate::sections::{self, ShownGrid};
+use crate::ui::{number, theme};
 
 /// An implant's outline, kept while section and surface stay.
 #[derive(Debug, Clone)]
@@ -100,6 +71,8 @@ pub struct SectionInput<'a> {
     pub layers: &'a [Layer],
     /// Names and units of the layers' volumes.
     pub names: &'a [(String, String)],
+    /// The visible unstructured grids.
+    pub grids: &'a [ShownGrid],
     /// The volume whose window a right drag changes.
     pub windowed: Option<&'a str>,
     /// The ball about everything.
@@ -141,7 +114,7 @@ impl SectionView {
         let Ok(in_points) = views.section(orientation, input.ball, size, 1.0) else { return };
         let density = if input.moving { 0.5 * pixels_per_point } else { pixels_per_point };
         if let Ok(in_pixels) = views.section(orientation, input.ball, size, density) {
-            self.picture(ui, &painter, rect, orientation, in_pixels, input.layers);
+            self.picture(ui, &painter, rect, orientation, in_pixels, input);
         }
         let map = OnScreen { section: in_points, rect };
         self.outlines_ui(&painter, &map, input);
@@ -220,16 +193,18 @@ impl SectionView {
         rect: Rect,
         orientation: Orientation,
         section: Section,
-        layers: &[Layer],
+        input: &SectionInput<'_>,
     ) {
-        if layers.is_empty() {
+        let SectionInput { layers, grids, .. } = input;
+        if layers.is_empty() && grids.is_empty() {
             self.key = None;
             self.texture = None;
             return;
         }
-        let key = Key { section, layers: layers.iter().map(LayerKey::of).collect() };
+        let key = Key::of(section, layers, grids);
         if self.key.as_ref() != Some(&key) {
-            let bytes = section::picture(&section, layers, [0.0; 3]);
+            let items: Vec<CellItem> = grids.iter().map(|shown| shown.item.clone()).collect();
+            let bytes = section::picture(&section, layers, &items, [0.0; 3]);
             let image = ColorImage::from_rgba_unmultiplied(section.size(), &bytes);
             if let Some(texture) = &mut self.texture {
                 texture.set(image, TextureOptions::LINEAR);
@@ -450,7 +425,10 @@ fn words_ui(
 ) {
     let font = FontId::proportional(12.5);
     let rect = map.rect;
-    let title = title(orientation, views);
+    let mut title = title(orientation, views);
+    if !input.grids.is_empty() && views.sections[orientation.index()].slab.thickness_mm > 0.0 {
+        title.push_str(" (grids: middle plane)");
+    }
     shadowed_ui(
         painter,
         rect.left_top() + vec2(8.0, 6.0),
@@ -482,7 +460,10 @@ fn words_ui(
             };
             layer.value(&p).map(|value| format!("{name} {value:.0}{unit}{label}"))
         });
-        let words = std::iter::once(lps(&p)).chain(values).collect::<Vec<_>>().join("   ");
+        let cells = input.grids.iter().filter_map(|shown| {
+            Some(format!("{} {}", shown.title, number::with_unit(shown.value(&p)?, &shown.unit)))
+        });
+        let words = std::iter::once(lps(&p)).chain(values).chain(cells).collect::<Vec<_>>().join("   ");
         let white = Color32::from_rgb(235, 238, 241);
         shadowed_ui(painter, rect.left_bottom() + vec2(8.0, -7.0), Align2::LEFT_BOTTOM, &words, &font, white);
     }

@@ -14,6 +14,7 @@ use crate::case::{Assets, Case, Edit, History, Source, file};
 use crate::jobs::{Job, Poll, Reporter, Step};
 use crate::load::{Limits, LoadError, Severity};
 use crate::save::labels::{self, Saved};
+use crate::scene;
 
 /// Something the user should read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,6 +59,8 @@ pub struct Session {
     /// Sources that gave nothing: not asked again until the user shows the thing anew.
     failed: BTreeSet<Key>,
     problems: Vec<Problem>,
+    /// Faults of grids that are problems already, read or not.
+    told: BTreeSet<String>,
     /// A case that was opened while this one has changes.
     waiting: Option<(PathBuf, Box<Case>)>,
     /// Grows whenever another case takes this one's place.
@@ -88,6 +91,7 @@ impl Session {
             running: None,
             failed: BTreeSet::new(),
             problems: Vec::new(),
+            told: BTreeSet::new(),
             waiting: None,
             replaced: 0,
             saved_labels: Saved::new(),
@@ -152,6 +156,18 @@ impl Session {
         for fault in faults {
             self.complain(fault);
         }
+    }
+
+    /// Says, once, which visible grids cannot be shown and why.
+    pub fn complain_of_grids(&mut self) {
+        let visible = self.history.case().grids.iter().filter(|grid| grid.visible);
+        let faults: BTreeSet<String> = visible.filter_map(|g| scene::grid_fault(g, &self.assets)).collect();
+        for fault in &faults {
+            if !self.told.contains(fault) {
+                self.complain(sentence(fault));
+            }
+        }
+        self.told = faults;
     }
 
     /// Changes the case; a refusal becomes a [`Problem`].

@@ -10,10 +10,12 @@ use egui::{
 use render::scene::Camera;
 
 use super::camera::{Ball, Facing, Lens};
+use super::color_bar::bars_ui;
 use super::cube;
 use super::overlay::Overlay;
 use super::pointer::{Phase, PointerEvent};
 use super::section_view::{edge_letters_ui, shadowed_ui};
+use crate::sections::ShownGrid;
 use crate::ui::theme;
 
 /// What the drag going on does.
@@ -43,6 +45,8 @@ pub struct SpatialInput<'a> {
     pub background: [f64; 3],
     /// What the tools draw.
     pub overlay: &'a Overlay,
+    /// The visible unstructured grids, for their colour bars.
+    pub grids: &'a [ShownGrid],
 }
 
 /// What the pointer and keys asked for.
@@ -93,6 +97,7 @@ impl SpatialView {
         let size = [f64::from(rect.width()), f64::from(rect.height())];
         let Ok(lens) = Lens::new(&input.camera, size) else { return answer };
         input.overlay.paint(&painter, rect, &lens);
+        bars_ui(&painter, rect, input.grids);
         edge_letters_ui(&painter, rect, &lens.frame().right, &lens.frame().up);
         let title = vec2(8.0, 6.0);
         let font = FontId::proportional(12.5);

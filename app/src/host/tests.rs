@@ -11,6 +11,7 @@ use render::volume::{Cutter, Point, Shape, Vector};
 
 use super::frame::Host;
 use super::registry::Registry;
+use crate::case::grids::{FieldChoice, GridChange};
 use crate::case::{Case, Edit, NamedCutter};
 
 /// A volume of 24 × 20 × 16 voxels of 2 mm, written as NRRD: what a user would open.
@@ -165,6 +166,44 @@ fn a_handle_is_dragged_in_the_view_and_escape_puts_it_back() {
     window.key_press(Key::Escape);
     window.run_steps(2);
     assert_eq!(cutter(&window), dragged, "back where the drag began");
+}
+
+/// A tetrahedron from (10, 0, 0), 8 mm along each axis, with the scalar "load" on its corners, as legacy VTK.
+fn vtk(folder: &std::path::Path) -> PathBuf {
+    let path = folder.join("bone.vtk");
+    let text = "# vtk DataFile Version 3.0\nmade\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n\
+                10 0 0 18 0 0 10 8 0 10 0 8\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\n\
+                SCALARS load double 1\nLOOKUP_TABLE default\n0 4 8 12\n";
+    std::fs::write(&path, text).expect("written");
+    path
+}
+
+#[test]
+fn a_dropped_grid_is_shown_and_a_field_that_it_has_not_is_said_once() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut window = window(Case::default());
+    window.state_mut().open([vtk(folder.path())]);
+    rest(&mut window);
+    assert_eq!(window.state().session().problems(), [], "no complaint");
+    assert_eq!(window.state().session().case().grids[0].id, "bone", "one grid");
+    assert_eq!(window.state().views().crosshair, Some(Point::new(14.0, 4.0, 4.0)), "the middle of its box");
+    window.get_by_label("Simulation").click();
+    window.run_steps(3);
+    window.get_by_label("The crosshair is outside of the grid.");
+    window.get_by_label("Go to the greatest").click();
+    window.run_steps(3);
+    assert_eq!(window.state().views().crosshair, Some(Point::new(10.0, 0.0, 8.0)), "where it is greatest");
+    window.get_by_label("At the crosshair 12");
+    let change = |change| Edit::ChangeGrid { id: "bone".to_owned(), change };
+    let strain = FieldChoice { name: "strain".to_owned(), place: None, part: None };
+    window.state_mut().apply(change(GridChange::Field(Some(strain))));
+    window.run_steps(3);
+    let problems = window.state().session().problems();
+    assert_eq!(problems.len(), 1, "one sentence for many frames");
+    assert!(problems[0].text.contains("no field \"strain\""), "{problems:?}");
+    window.get_by_label("Dismiss").click();
+    window.run_steps(3);
+    assert_eq!(window.state().session().problems(), [], "read, and not said again");
 }
 
 fn press(window: &mut Harness<'_, Host>, at: egui::Pos2, pressed: bool) {

@@ -97,7 +97,7 @@ pub struct SectionState {
 /// The state of all views.
 #[derive(Debug, Clone, Default)]
 pub struct Views {
-    /// Where the sections cross; world mm. `None` until a volume is there.
+    /// Where the sections cross; world mm. `None` until a volume or a grid is there.
     pub crosshair: Option<Point>,
     /// Pan and zoom, by [`Orientation::index`].
     pub sections: [SectionState; 3],
@@ -113,7 +113,7 @@ impl Views {
         Self::default()
     }
 
-    /// Gives volumes that are new a window, and the crosshair a place.
+    /// Gives volumes that are new a window, and the crosshair a place: the middle of the first volume, or else grid.
     pub fn adopt(&mut self, case: &Case, assets: &Assets) {
         for volume in &case.volumes {
             let Some(grid) = assets.grid(volume) else { continue };
@@ -123,6 +123,14 @@ impl Views {
             if self.crosshair.is_none() && volume.visible {
                 self.crosshair = Some(ball_of(volume, &grid).centre);
             }
+        }
+        let waits = case.volumes.iter().any(|v| v.visible && assets.grid(v).is_none());
+        if self.crosshair.is_none() && !waits {
+            let first = case.grids.iter().find_map(|grid| scene::grid(case, grid, assets));
+            self.crosshair = first.map(|item| {
+                let [low, high] = item.grid.bounds();
+                item.pose.point(&nalgebra::center(&low, &high))
+            });
         }
     }
 

@@ -92,7 +92,6 @@ pub struct Note {
 /// What one item of a file is.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
-#[expect(clippy::large_enum_variant, reason = "there are a few of them, and their samples lie elsewhere")]
 pub enum Content {
     /// One volume.
     Volume(Grid),

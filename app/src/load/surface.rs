@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use render::cells::{Faults, faults};
+use render::cells::Faults;
 use render::volume::cells::Place;
 use render::volume::{CellGrid, Point, TriangleMesh};
 
@@ -170,7 +170,7 @@ pub(super) fn grid_item(name: String, format: &'static str, grid: CellGrid, mut 
             ),
         });
     }
-    let Faults { flat, inverted } = faults(&grid);
+    let Faults { flat, inverted } = Faults::of(&grid);
     if flat > 0 {
         notes.push(Note {
             severity: Severity::Caution,

@@ -3,8 +3,9 @@
 //! [`Steps::grid`] and [`Steps::packed`] give a step at once, and read it first where they must. A player asks with
 //! [`Steps::want`] ahead of time and shows what [`Steps::is_ready`], so that no frame waits for a disk.
 //!
-//! Parts: `file` is the series file with its stream, `packed` what the renderer takes of it.
+//! Parts: `file` is the series file with its stream, `packed` what the renderer takes of it, [`clock`] which step is due.
 
+pub mod clock;
 mod file;
 mod packed;
 #[cfg(test)]

@@ -11,6 +11,7 @@ pub mod implants;
 pub mod labels;
 pub mod player;
 pub mod sections;
+pub mod simulation;
 pub mod transfer;
 pub mod volumes;
 
@@ -27,6 +28,7 @@ pub fn register_all(registry: &mut Registry) -> Result<(), RegistryError> {
     registry.add::<cutting::Cutting>()?;
     registry.add::<fragments::Fragments>()?;
     registry.add::<implants::Implants>()?;
+    registry.add::<simulation::Simulation>()?;
     registry.add::<labels::LabelsTool>()?;
     registry.add::<sections::Sections>()?;
     registry.add::<player::Player>()?;

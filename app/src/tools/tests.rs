@@ -4,15 +4,18 @@ use std::sync::Arc;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
+use render::volume::cells::{CellKind, Field, Step, Values};
 use render::volume::{
-    Affine, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Series, Shape, Side, Transfer, TriangleMesh,
-    Vector,
+    Affine, CellGrid, ControlPoint, Cutter, Grid, Point, Rescale, Samples, Series, Shape, Side, Transfer,
+    TriangleMesh, Vector,
 };
 
 use super::register_all;
 use crate::case::assets::{Asset, Data, Key};
 use crate::case::labels::LabelChange;
-use crate::case::{Assets, Case, Edit, Fragment, Implant, LabelSet, NamedCutter, Source, Volume, edit};
+use crate::case::{
+    Assets, Case, Edit, Fragment, Implant, LabelSet, NamedCutter, Source, UnstructuredGrid, Volume, edit,
+};
 use crate::host::context::{Request, Selection, ToolContext, VolumeMode};
 use crate::host::overlay::Overlay;
 use crate::host::pointer::{Phase, SectionEvent};
@@ -20,6 +23,8 @@ use crate::host::registry::Registry;
 use crate::host::tool::ToolId;
 use crate::host::views::{Orientation, Views};
 use crate::steps::Steps;
+
+mod simulation;
 
 /// What a tool is drawn in.
 #[derive(Default)]
@@ -39,7 +44,24 @@ fn asset(key: Key, data: Data) -> Arc<Asset> {
     Arc::new(Asset { key, name: "made".into(), format: "test", modality: None, data, notes: Vec::new() })
 }
 
-/// A bench with one of everything: a loaded volume in two fragments, a plane, a cylinder, an implant.
+/// Two tetrahedra with a scalar and a vector on their points and a scalar on the cells, at two moments.
+fn cells() -> CellGrid {
+    let points = [[0.0, 0.0, 0.0], [6.0, 0.0, 0.0], [0.0, 6.0, 0.0], [0.0, 0.0, 6.0], [6.0, 6.0, 6.0]];
+    let step = |time: f64| {
+        let field = |name: &str, components, values: Vec<f64>| {
+            Field::new(name.to_owned(), components, Values::F64(values))
+        };
+        let stress = field("stress", 1, [10.0, 20.0, 30.0, 50.0, -10.0].map(|v| v + time).to_vec());
+        let moved = field("moved", 3, (0..15).map(f64::from).collect());
+        let part = field("part", 1, vec![1.0, 2.0]);
+        Step { time, point_fields: vec![stress, moved], cell_fields: vec![part] }
+    };
+    let corners = vec![0, 1, 2, 3, 1, 2, 3, 4];
+    let points = points.map(Point::from).to_vec();
+    CellGrid::new(points, vec![CellKind::Tetra; 2], corners, vec![step(0.0), step(0.5)]).expect("cells")
+}
+
+/// A bench with one of everything: a loaded volume in two fragments, a plane, a cylinder, an implant, a grid of cells.
 fn bench() -> Bench {
     let samples = (0..8 * 8 * 8).map(|i| i as i16).collect();
     let grid = Grid::new([8, 8, 8], Samples::I16(samples), Rescale::default(), Affine::identity());
@@ -49,15 +71,18 @@ fn bench() -> Bench {
     let transfer = Transfer::new(vec![point(100.0, 0.0), point(400.0, 0.5)], 1.0).expect("transfer");
     let volume = Volume::new("ct", Source::Builtin("test/ct".into()), Arc::new(transfer));
     let implant = Implant::new("plate", Source::Builtin("test/plate".into()));
+    let load = UnstructuredGrid::new("load", Source::Builtin("test/load".into()));
     let mut assets = Assets::default();
     assets.insert(asset(Key::of_volume(&volume), Data::Grid(Arc::new(grid.expect("grid")))));
     assets.insert(asset(Key::of_implant(&implant), Data::Mesh(Arc::new(mesh))));
+    assets.insert(asset(Key::of_grid(&load), Data::Cells(Arc::new(cells()))));
     let plane = Cutter::plane(Point::new(3.5, 3.5, 3.5), Vector::x()).expect("plane");
     let tube = Cutter::cylinder(Point::new(3.5, 3.5, 3.5), Vector::z(), 2.0).expect("tube");
     let piece = |id: &str, side| Fragment::new(id, "ct", [("cut".to_owned(), side)].into());
     let case = Case {
         volumes: vec![volume],
         implants: vec![implant],
+        grids: vec![load],
         cutters: vec![NamedCutter::new("cut", plane), NamedCutter::new("drill", tube)],
         fragments: vec![piece("left part", Side::Plus), piece("right part", Side::Minus)],
         labels: vec![LabelSet::new("necrosis", "ct", None)],
@@ -91,7 +116,10 @@ fn ids() -> Vec<ToolId> {
 
 #[test]
 fn every_registered_panel_draws_with_and_without_a_case() {
-    assert!(ids().len() >= 8, "volumes, transfer, cutting, fragments, implants, labels, sections, player");
+    assert!(
+        ids().len() >= 9,
+        "volumes, transfer, cutting, fragments, implants, simulation, labels, sections, player"
+    );
     for id in ids() {
         let mut full = panel(bench(), id);
         full.run();

@@ -2,6 +2,8 @@
 
 pub mod curve;
 pub mod name;
+pub mod notes;
+pub mod number;
 pub mod pose;
 pub mod theme;
 pub mod value;

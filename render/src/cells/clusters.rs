@@ -8,6 +8,8 @@
 
 use std::sync::OnceLock;
 
+use rayon::prelude::*;
+
 use super::split;
 use crate::volume::cells::{CellGrid, CellKind, Place};
 use crate::volume::{Point, Vector};
@@ -24,11 +26,16 @@ pub struct Faults {
     pub inverted: u64,
 }
 
-/// What is wrong with the cells of a grid.
-pub fn faults(grid: &CellGrid) -> Faults {
-    let mut faults = Faults::default();
-    parts(grid, &mut faults);
-    faults
+impl Faults {
+    /// Those of a grid.
+    pub fn of(grid: &CellGrid) -> Self {
+        let of_cell = |mut faults: Self, cell| {
+            parts_of(grid, cell, &mut faults, |_| ());
+            faults
+        };
+        let sum = |a: Self, b: Self| Self { flat: a.flat + b.flat, inverted: a.inverted + b.inverted };
+        (0..grid.len()).into_par_iter().fold(Self::default, of_cell).reduce(Self::default, sum)
+    }
 }
 
 /// Cells of a grid, ready to be drawn from anywhere.
@@ -230,31 +237,36 @@ impl Clusters {
 
 /// All tetrahedra that have a volume.
 fn parts(grid: &CellGrid, faults: &mut Faults) -> Vec<Part> {
-    let points = grid.points();
     let mut parts = Vec::with_capacity(grid.len());
     for cell in 0..grid.len() {
-        let (kind, corners) = grid.cell(cell);
-        let [mut positive, mut negative] = [false; 2];
-        let mut none = true;
-        split::tetrahedra(kind, corners, |mut corners| {
-            none = false;
-            let [a, b, c, d] = corners.map(|n| points[n as usize]);
-            let volume = (b - a).cross(&(c - a)).dot(&(d - a));
-            if volume == 0.0 || volume.is_nan() {
-                faults.flat += 1;
-                return;
-            }
-            *(if volume < 0.0 { &mut negative } else { &mut positive }) = true;
-            corners.sort_unstable();
-            let [a, b, c, d] = corners.map(|n| points[n as usize].coords);
-            let middle = (a * 0.25 + b * 0.25) + (c * 0.25 + d * 0.25);
-            parts.push(Part { corners, middle, cell: cell as u32 });
-        });
-        faults.flat += u64::from(none);
-        // Files differ about which way a wedge is turned.
-        faults.inverted += u64::from(negative && (positive || kind != CellKind::Wedge));
+        parts_of(grid, cell, faults, |part| parts.push(part));
     }
     parts
+}
+
+/// Those of one cell.
+fn parts_of(grid: &CellGrid, cell: usize, faults: &mut Faults, mut found: impl FnMut(Part)) {
+    let points = grid.points();
+    let (kind, corners) = grid.cell(cell);
+    let [mut positive, mut negative] = [false; 2];
+    let mut none = true;
+    split::tetrahedra(kind, corners, |mut corners| {
+        none = false;
+        let [a, b, c, d] = corners.map(|n| points[n as usize]);
+        let volume = (b - a).cross(&(c - a)).dot(&(d - a));
+        if volume == 0.0 || volume.is_nan() {
+            faults.flat += 1;
+            return;
+        }
+        *(if volume < 0.0 { &mut negative } else { &mut positive }) = true;
+        corners.sort_unstable();
+        let [a, b, c, d] = corners.map(|n| points[n as usize].coords);
+        let middle = (a * 0.25 + b * 0.25) + (c * 0.25 + d * 0.25);
+        found(Part { corners, middle, cell: cell as u32 });
+    });
+    faults.flat += u64::from(none);
+    // Files differ about which way a wedge is turned.
+    faults.inverted += u64::from(negative && (positive || kind != CellKind::Wedge));
 }
 
 /// The scalar of one step, where clusters have it.

@@ -54,13 +54,14 @@ mod wire;
 mod worker;
 
 pub(crate) use among::{Placed, Spans, Strip, Walker};
-pub use clusters::{Faults, faults};
+pub use clusters::Faults;
 pub use early::Early;
 pub use engine::Engine;
 pub use fold::Segment;
 pub use group::Group;
 pub use link::{Link, LinkError};
 pub use project::Breaks;
+pub(crate) use split::tetrahedra;
 pub use spread::Spread;
 pub use stats::{Counts, Stats};
 

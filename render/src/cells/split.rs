@@ -19,7 +19,7 @@ fn faces(kind: CellKind) -> &'static [[usize; 4]] {
 }
 
 /// Calls `found` with each tetrahedron of a cell: positive where the cell is as VTK orders it.
-pub(super) fn tetrahedra(kind: CellKind, corners: &[u32], mut found: impl FnMut([u32; 4])) {
+pub(crate) fn tetrahedra(kind: CellKind, corners: &[u32], mut found: impl FnMut([u32; 4])) {
     let Some(&lowest) = corners.iter().min() else { return };
     for face in faces(kind) {
         let face = face.map(|f| corners[f]);

@@ -45,7 +45,7 @@ const HEXAHEDRON: &[&[usize]] =
     &[&[0, 1, 2, 3], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[0, 3, 7, 4]];
 
 /// Corners of the tetrahedra of a cell, as numbers of points.
-fn tetrahedra(kind: CellKind, corners: &[u32]) -> Vec<[u32; 4]> {
+pub(crate) fn tetrahedra(kind: CellKind, corners: &[u32]) -> Vec<[u32; 4]> {
     let faces = match kind {
         CellKind::Tetra => TETRA,
         CellKind::Pyramid => PYRAMID,

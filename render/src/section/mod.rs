@@ -15,12 +15,18 @@
 //! then of second order in the step: a linear field is exact, a bend of the scalar by a slope of J per mm errs by
 //! at most J·step²/8 of the integral, an end at a face or a cutter by half a step of the value there.
 //!
+//! **Unstructured grids**: a pixel takes the scalar of the cell that its centre lies in, linear between the corners of
+//! the cell's tetrahedra (the same ones as in a picture), or the cell's own. Thick sections show the middle plane of them,
+//! since a mean or a greatest value of another unit than the volumes' would not be told apart.
+//!
 //! **Together**: a pixel's colour is the mean of the layers that have a value there, by their weights. Labels are
 //! painted on their own layer first: the nearest label in the middle plane, by the rule of
-//! [`crate::scene::Labels`].
+//! [`crate::scene::Labels`]. A grid counts as one more layer, of weight 1, in the colour of its transfer function; where that
+//! is clear it has no value. Its opacity, which is that of a length, does not matter otherwise.
 //!
 //! No GPU and no window here: what a section shows is what a measurement reads.
 
+mod cells;
 mod layer;
 mod outline;
 mod picture;
@@ -32,6 +38,7 @@ mod tests;
 
 use thiserror::Error;
 
+pub use cells::{CellSpan, cell_spans, cell_value, cell_values};
 pub use layer::Layer;
 pub use outline::{PieceLine, cutter_outline, mesh_outline, piece_outlines};
 pub use picture::{picture, values};

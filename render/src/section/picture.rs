@@ -2,10 +2,12 @@
 
 use rayon::prelude::*;
 
+use super::cells::cell_values;
 use super::layer::{Layer, Prepared};
 use super::stations::{Gathered, Station, stations};
 use super::sweep::{Row, sweep};
 use super::{Section, SlabMode};
+use crate::scene::CellItem;
 use crate::volume::label_at;
 
 /// A layer ready for rows.
@@ -90,12 +92,16 @@ pub fn values(section: &Section, layer: &Layer) -> Vec<f64> {
     values
 }
 
-/// The picture of all layers, each pixel their mean by weight where they have a value, over `background` (display
-/// values, 0 to 1); opaque RGBA, 4 bytes a pixel, rows from the top.
-pub fn picture(section: &Section, layers: &[Layer], background: [f64; 3]) -> Vec<u8> {
+/// The picture of all layers and grids: opaque RGBA, 4 bytes a pixel, rows from the top.
+///
+/// Each pixel is the mean by weight of those that have a value there, over `background` (display values, 0 to 1). A grid
+/// counts as a layer of weight 1 where its transfer function is not clear.
+pub fn picture(section: &Section, layers: &[Layer], grids: &[CellItem], background: [f64; 3]) -> Vec<u8> {
     let [width, height] = section.size;
     let ready: Vec<Ready<'_>> =
         layers.iter().filter(|l| l.weight > 0.0).map(|layer| Ready::of(section, layer)).collect();
+    let colored: Vec<(&CellItem, Vec<f64>)> =
+        grids.iter().map(|item| (item, cell_values(section, item))).collect();
     let mut bytes = vec![255_u8; width * height * 4];
     bytes.par_chunks_mut(width * 4).enumerate().for_each(|(j, bytes)| {
         let mut kept = vec![false; width];
@@ -116,6 +122,14 @@ pub fn picture(section: &Section, layers: &[Layer], background: [f64; 3]) -> Vec
                     sum[c] += layer.weight * painted;
                 }
                 sum[3] += layer.weight;
+            }
+        }
+        for (item, values) in &colored {
+            for (sum, value) in sum.iter_mut().zip(&values[j * width..]).filter(|(_, v)| !v.is_nan()) {
+                let [r, g, b, opacity] = item.transfer.rgba(*value);
+                if opacity > 0.0 {
+                    *sum = [sum[0] + r, sum[1] + g, sum[2] + b, sum[3] + 1.0];
+                }
             }
         }
         for (pixel, sum) in bytes.chunks_exact_mut(4).zip(&sum) {

@@ -1,5 +1,6 @@
 //! Sections against closed forms.
 
+mod cells;
 mod lines;
 mod slabs;
 
@@ -105,7 +106,7 @@ fn two_layers_blend_by_weight_and_one_alone_is_whole() {
     let high = layer(flat(50.0, 2), vec![Piece::whole()]);
     low.window = Window { level: 0.0, width: 200.0 };
     let section = Section::new(Point::new(1.5, 0.0, 0.0), Vector::x(), Vector::y(), 1.0, [6, 1]);
-    let bytes = picture(&section.expect("section"), &[low, high], [0.0, 0.0, 1.0]);
+    let bytes = picture(&section.expect("section"), &[low, high], &[], [0.0, 0.0, 1.0]);
     let pixel = |i: usize| [bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]];
     assert_eq!(pixel(0), [0, 0, 255, 255], "background beside the data");
     // A quarter grey below, white above, half each: 0.625.

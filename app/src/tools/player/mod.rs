@@ -1,15 +1,13 @@
-//! Plays a volume over time: which step is due is `clock`'s, the panel draws and asks.
+//! Plays a volume over time: which step is due is [`crate::steps::clock`]'s, the panel draws and asks.
 //!
 //! A step is shown when it is there: a step that is due but not read yet is waited for, and what the clock passed
 //! over meanwhile is counted as dropped.
 
-mod clock;
 mod panel;
 
 use crate::host::context::ToolContext;
 use crate::host::tool::{Tool, ToolId};
-
-pub use clock::{Clock, Due};
+use crate::steps::clock::Clock;
 
 /// Play, stop, speed, loop, single steps and the time axis.
 #[derive(Debug, Default)]

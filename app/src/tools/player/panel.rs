@@ -3,9 +3,9 @@
 use egui::{Button, DragValue, RichText, Slider, Ui};
 
 use super::Player;
-use super::clock::{Due, SPEEDS};
 use crate::case::{Edit, Volume};
 use crate::host::context::ToolContext;
+use crate::steps::clock::{Due, SPEEDS};
 use crate::steps::{Direction, Repeat, Steps};
 use crate::ui::theme;
 

@@ -1,13 +1,13 @@
 //! The panel of the volumes.
 
-use egui::{Button, ComboBox, RichText, Slider, Ui};
+use egui::{Button, ComboBox, Slider, Ui};
 
 use super::{mode, window};
 use crate::case::{Edit, Volume, assets};
 use crate::host::context::{Request, TextureFormat, ToolContext, Window};
 use crate::host::views;
-use crate::load::Severity;
 use crate::sections;
+use crate::ui::notes::notes_ui;
 use crate::ui::pose::{PoseEditor, PoseInput};
 use crate::ui::{name, theme, value};
 
@@ -76,17 +76,7 @@ fn chosen_ui(pose: &mut PoseEditor, ctx: &mut ToolContext<'_>, ui: &mut Ui, volu
         theme::quiet_ui(ui, format!("{} · {modality} · {} samples", asset.format, grid.samples().kind()));
         theme::quiet_ui(ui, format!("{nx} × {ny} × {nz} voxels of {sx:.3} × {sy:.3} × {sz:.3} mm"));
         theme::quiet_ui(ui, format!("values {low:.0} … {high:.0}"));
-        for note in asset.notes.iter().filter(|n| n.severity >= Severity::Caution) {
-            ui.label(RichText::new(&note.text).small().color(theme::CAUTION));
-        }
-        let facts: Vec<_> = asset.notes.iter().filter(|n| n.severity == Severity::Fact).collect();
-        if !facts.is_empty() {
-            ui.collapsing(format!("Notes ({})", facts.len()), |ui| {
-                for note in facts {
-                    theme::quiet_ui(ui, note.text.clone());
-                }
-            });
-        }
+        notes_ui(ui, &asset.notes);
         window_ui(ctx, ui, volume, grid.range());
         let mut blend = volume.blend;
         if ui.add(Slider::new(&mut blend, 0.0..=1.0).text("Weight in the sections")).changed() {

@@ -154,7 +154,7 @@ fn labels_are_painted_by_the_nearest_and_ride_with_their_piece() {
     let section =
         Section::new(Point::new(43.5, 1.0, 1.0), Vector::x(), Vector::y(), 1.0, [8, 1]).expect("a section");
     for section in [section, slab(section, 2.0, SlabMode::Mean)] {
-        let bytes = picture(&section, std::slice::from_ref(&layer), [0.0; 3]);
+        let bytes = picture(&section, std::slice::from_ref(&layer), &[], [0.0; 3]);
         let pixels: Vec<_> = bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
         let (plain, red, green) = ([128, 128, 128], [191, 64, 64], [0, 255, 0]);
         assert_eq!(pixels, [plain, plain, red, red, green, green, plain, plain], "two voxels a label");

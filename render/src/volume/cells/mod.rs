@@ -160,6 +160,7 @@ pub struct CellGrid {
     starts: Vec<u32>,
     corners: Vec<u32>,
     steps: Vec<Step>,
+    bounds: [Point; 2],
 }
 
 impl CellGrid {
@@ -202,7 +203,11 @@ impl CellGrid {
             return Err(CellGridError::Index { cell, point: corners[at], count });
         }
         check_steps(&steps, points.len(), kinds.len())?;
-        Ok(Self { points, kinds, starts, corners, steps })
+        let (mut low, mut high) = (Point::from([f64::INFINITY; 3]), Point::from([f64::NEG_INFINITY; 3]));
+        for p in &points {
+            (low, high) = (low.inf(p), high.sup(p));
+        }
+        Ok(Self { points, kinds, starts, corners, steps, bounds: [low, high] })
     }
 
     /// The points.
@@ -243,13 +248,7 @@ impl CellGrid {
 
     /// Least and greatest coordinates of the points; mm.
     pub fn bounds(&self) -> [Point; 2] {
-        let mut low = Point::from([f64::INFINITY; 3]);
-        let mut high = Point::from([f64::NEG_INFINITY; 3]);
-        for p in &self.points {
-            low = low.inf(p);
-            high = high.sup(p);
-        }
-        [low, high]
+        self.bounds
     }
 
     /// Least and greatest finite value of one component of a field over all steps; nothing where no

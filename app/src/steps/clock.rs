@@ -1,9 +1,9 @@
 //! Which step is due: from the clock on the wall, the times of the steps, speed and direction. No window.
 
-use crate::steps::{Direction, Repeat};
+use super::{Direction, Repeat};
 
 /// Slowest and fastest playing, against the steps' own times.
-pub(super) const SPEEDS: [f64; 2] = [0.05, 20.0];
+pub const SPEEDS: [f64; 2] = [0.05, 20.0];
 
 /// What is due.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
