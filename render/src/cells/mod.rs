@@ -373,6 +373,7 @@ impl CellRenderer {
             (item.step, item.scalar.clone(), values)
         }));
         let prepare_ms = begin.elapsed().as_secs_f64() * 1e3;
+        let begin = Instant::now();
         Ok(Ready {
             clusters,
             scalars,
@@ -383,7 +384,7 @@ impl CellRenderer {
             skip_clear: options.skip_clear,
             wide: options.wide && has_wide(),
             prepare_ms,
-            begin: Instant::now(),
+            begin,
         })
     }
 }
