@@ -6,7 +6,7 @@ use super::fold::{Segment, Stops, add_up, integrate, length, merge, overlap, sor
 use super::lens::Lens;
 use super::scan::{Corner, Raw, Raws, Rect, scan};
 use super::stats::Counts;
-use super::table::{BATCH, Table};
+use super::table::{BATCH, Batch, Table};
 use crate::volume::cells::Place;
 
 /// Pixels that a cluster is drawn in at once, across and down: what it makes there has to be remembered.
@@ -486,14 +486,14 @@ fn go_on_by(
     aside: &mut Vec<(Segment, u32)>,
 ) {
     for batch in raws.chunks(BATCH) {
-        let (mut from, mut to, mut mm) = ([0.0; BATCH], [0.0; BATCH], [0.0; BATCH]);
+        let (mut from, mut to, mut mm) = (Batch::of(0.0), Batch::of(0.0), Batch::of(0.0));
         for (n, raw) in batch.iter().enumerate() {
-            [from[n], to[n]] = constant.map_or(raw.values, |value| [value; 2]);
-            mm[n] = length(raw.back - raw.front, open[raw.pixel as usize].stretch);
+            [from.0[n], to.0[n]] = constant.map_or(raw.values, |value| [value; 2]);
+            mm.0[n] = length(raw.back - raw.front, open[raw.pixel as usize].stretch);
         }
-        let mut seen = [[0.0; 4]; BATCH];
+        let mut seen = Batch::of([0.0; 4]);
         table.segments([&from, &to], &mm, &mut seen);
-        for (raw, rgba) in batch.iter().zip(seen) {
+        for (raw, rgba) in batch.iter().zip(seen.0) {
             let Open { run, aside: last, .. } = &mut open[raw.pixel as usize];
             if raw.front == run.back {
                 under(&mut run.rgba, rgba);

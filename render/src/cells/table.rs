@@ -81,14 +81,27 @@ pub(super) struct Place {
     varied: f32,
 }
 
+/// One of each of several segments, where no access of memory straddles two lines of a cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
+pub(super) struct Batch<T>(pub(super) [T; BATCH]);
+
+impl<T: Copy> Batch<T> {
+    /// The same for all.
+    #[inline(always)]
+    pub(super) fn of(all: T) -> Self {
+        Self([all; BATCH])
+    }
+}
+
 /// Several places.
 #[derive(Debug)]
 struct Places {
-    piece: [u32; BATCH],
-    node: [u32; BATCH],
+    piece: Batch<u32>,
+    node: Batch<u32>,
     /// How many nodes behind its node.
-    part: [f32; BATCH],
-    varied: [f32; BATCH],
+    part: Batch<f32>,
+    varied: Batch<f32>,
 }
 
 /// A transfer function; a *position* is a value counted from the first control point, the span of all being 1.
@@ -248,27 +261,27 @@ impl Table {
 
     /// Looks positions up.
     #[inline(always)]
-    fn places(&self, positions: &[f32; BATCH]) -> Places {
-        let mut piece = [0_u32; BATCH];
+    fn places(&self, positions: &Batch<f32>) -> Places {
+        let mut piece = Batch::of(0_u32);
         for next in self.pieces.iter().skip(1) {
             for n in 0..BATCH {
-                piece[n] += u32::from(positions[n] >= next.from);
+                piece.0[n] += u32::from(positions.0[n] >= next.from);
             }
         }
-        let mut node = [0_u32; BATCH];
-        let mut part = [0.0; BATCH];
-        let mut varied = [0.0; BATCH];
-        let (mut last, mut first) = ([0.0; BATCH], [0; BATCH]);
+        let mut node = Batch::of(0_u32);
+        let mut part = Batch::of(0.0);
+        let mut varied = Batch::of(0.0);
+        let (mut last, mut first) = (Batch::of(0.0), Batch::of(0));
         for n in 0..BATCH {
-            let p = &self.pieces[piece[n] as usize];
-            part[n] = (positions[n] - p.origin) * p.scale;
-            (first[n], last[n]) = (p.first, (p.last - p.first) as f32);
-            varied[n] = p.varied + if p.varies > 0.0 { p.varies * (positions[n] - p.origin) } else { 0.0 };
+            let p = &self.pieces[piece.0[n] as usize];
+            part.0[n] = (positions.0[n] - p.origin) * p.scale;
+            (first.0[n], last.0[n]) = (p.first, (p.last - p.first) as f32);
+            varied.0[n] = p.varied + if p.varies > 0.0 { p.varies * (positions.0[n] - p.origin) } else { 0.0 };
         }
         for n in 0..BATCH {
-            let index = part[n].max(0.0).min(last[n]) as u32;
-            part[n] -= index as f32;
-            node[n] = first[n] + index;
+            let index = part.0[n].max(0.0).min(last.0[n]) as u32;
+            part.0[n] -= index as f32;
+            node.0[n] = first.0[n] + index;
         }
         Places { piece, node, part, varied }
     }
@@ -277,64 +290,64 @@ impl Table {
     #[inline(always)]
     pub(super) fn segments(
         &self,
-        [from, to]: [&[f32; BATCH]; 2],
-        mm: &[f32; BATCH],
-        seen: &mut [[f32; 4]; BATCH],
+        [from, to]: [&Batch<f32>; 2],
+        mm: &Batch<f32>,
+        seen: &mut Batch<[f32; 4]>,
     ) {
         let (a, b) = (self.places(from), self.places(to));
-        let mut tau = [0.0; BATCH];
-        let mut rise = [0.0; BATCH];
-        let mut by = [0.0; BATCH];
+        let mut tau = Batch::of(0.0);
+        let mut rise = Batch::of(0.0);
+        let mut by = Batch::of(0.0);
         for n in 0..BATCH {
-            rise[n] = to[n] - from[n];
-            by[n] = mm[n] / rise[n];
+            rise.0[n] = to.0[n] - from.0[n];
+            by.0[n] = mm.0[n] / rise.0[n];
         }
         for n in 0..BATCH {
-            let p = &self.pieces[a.piece[n] as usize];
-            if rise[n].abs() * p.scale > STILL {
-                let near = self.nodes[a.node[n] as usize].sum(a.part[n], p.width);
+            let p = &self.pieces[a.piece.0[n] as usize];
+            if rise.0[n].abs() * p.scale > STILL {
+                let near = self.nodes[a.node.0[n] as usize].sum(a.part.0[n], p.width);
                 let far =
-                    self.nodes[b.node[n] as usize].sum(b.part[n], self.pieces[b.piece[n] as usize].width);
+                    self.nodes[b.node.0[n] as usize].sum(b.part.0[n], self.pieces[b.piece.0[n] as usize].width);
                 for c in 0..4 {
-                    seen[n][c] = (far[c] - near[c]) as f32 * by[n];
+                    seen.0[n][c] = (far[c] - near[c]) as f32 * by.0[n];
                 }
             } else {
-                seen[n] = self.rate(p, from[n] + 0.5 * rise[n]).map(|v| v * mm[n]);
+                seen.0[n] = self.rate(p, from.0[n] + 0.5 * rise.0[n]).map(|v| v * mm.0[n]);
             }
-            tau[n] = seen[n][3];
+            tau.0[n] = seen.0[n][3];
         }
-        let mut rough = [0.0; BATCH];
-        let mut across = [0; BATCH];
+        let mut rough = Batch::of(0.0);
+        let mut across = Batch::of(0);
         for n in 0..BATCH {
-            rough[n] = self.pieces[a.piece[n] as usize].rough * mm[n];
-            across[n] = a.piece[n] ^ b.piece[n];
+            rough.0[n] = self.pieces[a.piece.0[n] as usize].rough * mm.0[n];
+            across.0[n] = a.piece.0[n] ^ b.piece.0[n];
         }
-        let mut alone = [0_u32; BATCH];
-        let mut part = [0.0; BATCH];
-        let mut lags = [0.0; BATCH];
+        let mut alone = Batch::of(0_u32);
+        let mut part = Batch::of(0.0);
+        let mut lags = Batch::of(0.0);
         for n in 0..BATCH {
-            let t = tau[n];
+            let t = tau.0[n];
             let opacity = opacity(t);
-            let uneven = t * (b.varied[n] - a.varied[n]).abs() > EVEN_COLOR;
-            let smooth = rough[n] * (rise[n] * rise[n]) <= EVEN_DEPTH;
+            let uneven = t * (b.varied.0[n] - a.varied.0[n]).abs() > EVEN_COLOR;
+            let smooth = rough.0[n] * (rise.0[n] * rise.0[n]) <= EVEN_DEPTH;
             // What changes too much is seen to by itself.
-            let much = if smooth { across[n] } else { 1 };
-            alone[n] = if uneven { much } else { 0 };
-            part[n] = if t > 0.0 { opacity / t } else { 0.0 };
-            lags[n] = if uneven { rise[n] * behind(t, opacity) } else { 0.0 };
-            tau[n] = if t > 0.0 { opacity } else { 0.0 };
+            let much = if smooth { across.0[n] } else { 1 };
+            alone.0[n] = if uneven { much } else { 0 };
+            part.0[n] = if t > 0.0 { opacity / t } else { 0.0 };
+            lags.0[n] = if uneven { rise.0[n] * behind(t, opacity) } else { 0.0 };
+            tau.0[n] = if t > 0.0 { opacity } else { 0.0 };
         }
         for n in 0..BATCH {
-            let slope = &self.pieces[a.piece[n] as usize].slope;
-            let depth = seen[n];
+            let slope = &self.pieces[a.piece.0[n] as usize].slope;
+            let depth = seen.0[n];
             for c in 0..3 {
-                seen[n][c] = depth[c] * part[n] + slope[c] * lags[n];
+                seen.0[n][c] = depth[c] * part.0[n] + slope[c] * lags.0[n];
             }
-            seen[n][3] = tau[n];
+            seen.0[n][3] = tau.0[n];
         }
-        for n in (0..BATCH).filter(|&n| alone[n] != 0) {
-            let [a, b] = [(from, &a), (to, &b)].map(|(x, p)| self.find(x[n], p.piece[n] as usize));
-            seen[n] = self.segment(&a, &b, mm[n]);
+        for n in (0..BATCH).filter(|&n| alone.0[n] != 0) {
+            let [a, b] = [(from, &a), (to, &b)].map(|(x, p)| self.find(x.0[n], p.piece.0[n] as usize));
+            seen.0[n] = self.segment(&a, &b, mm.0[n]);
         }
     }
 
