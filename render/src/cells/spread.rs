@@ -5,7 +5,7 @@ use super::project::Frame;
 /// Which clusters a worker begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Spread {
-    /// Those of one part of the picture, from front to back: what is opaque in front hides what is behind it without a word
+    /// Those of one band of the picture, from front to back: what is opaque in front hides what is behind it without a word
     /// to another worker.
     #[default]
     Columns,

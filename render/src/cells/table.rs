@@ -276,7 +276,8 @@ impl Table {
             let p = &self.pieces[piece.0[n] as usize];
             part.0[n] = (positions.0[n] - p.origin) * p.scale;
             (first.0[n], last.0[n]) = (p.first, (p.last - p.first) as f32);
-            varied.0[n] = p.varied + if p.varies > 0.0 { p.varies * (positions.0[n] - p.origin) } else { 0.0 };
+            varied.0[n] =
+                p.varied + if p.varies > 0.0 { p.varies * (positions.0[n] - p.origin) } else { 0.0 };
         }
         for n in 0..BATCH {
             let index = part.0[n].max(0.0).min(last.0[n]) as u32;
@@ -288,12 +289,7 @@ impl Table {
 
     /// As [`Self::segment`], of several at once.
     #[inline(always)]
-    pub(super) fn segments(
-        &self,
-        [from, to]: [&Batch<f32>; 2],
-        mm: &Batch<f32>,
-        seen: &mut Batch<[f32; 4]>,
-    ) {
+    pub(super) fn segments(&self, [from, to]: [&Batch<f32>; 2], mm: &Batch<f32>, seen: &mut Batch<[f32; 4]>) {
         let (a, b) = (self.places(from), self.places(to));
         let mut tau = Batch::of(0.0);
         let mut rise = Batch::of(0.0);
@@ -306,8 +302,8 @@ impl Table {
             let p = &self.pieces[a.piece.0[n] as usize];
             if rise.0[n].abs() * p.scale > STILL {
                 let near = self.nodes[a.node.0[n] as usize].sum(a.part.0[n], p.width);
-                let far =
-                    self.nodes[b.node.0[n] as usize].sum(b.part.0[n], self.pieces[b.piece.0[n] as usize].width);
+                let far = self.nodes[b.node.0[n] as usize]
+                    .sum(b.part.0[n], self.pieces[b.piece.0[n] as usize].width);
                 for c in 0..4 {
                     seen.0[n][c] = (far[c] - near[c]) as f32 * by.0[n];
                 }

@@ -68,7 +68,7 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
         }
         BenchName::Cells => {
             cells::run(args.data.as_deref(), args.peer.as_deref(), &mut bench)?;
-            cells::charts(&bench.rows)
+            cells::charts(&bench.rows, args.peer.is_some())
         }
         BenchName::Pareto => {
             let case = args.data.as_deref().filter(|path| input::is_case(path));

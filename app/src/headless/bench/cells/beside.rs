@@ -11,9 +11,10 @@ use ::render::scene::{Camera, Projection};
 use ::render::volume::cells::{CellGrid, Place};
 use serde_json::{Value, json};
 
-use super::super::Bench;
 use super::super::peer::Peer;
+use super::super::{Bench, Row, number, series};
 use super::{EARLY, VIEWS, error, known, scenes};
+use crate::headless::plot::{Chart, Scale};
 use crate::headless::{Failure, write_file};
 
 /// What a peer is asked for.
@@ -130,6 +131,21 @@ fn take_turns(
         }
     }
     Ok(TURNS)
+}
+
+/// Time against error.
+pub(super) fn chart(rows: &[Row]) -> Chart {
+    Chart {
+        title: "Unstructured grids: a frame's time against its largest error".to_owned(),
+        x: "frame, ms".to_owned(),
+        y: "largest error, 1/255".to_owned(),
+        y_scale: Scale::Log,
+        joined: false,
+        series: series(rows, "renderer", &|row| {
+            let label = row.get("line").and_then(Value::as_str).unwrap_or_default();
+            (number(row, "frame_ms"), number(row, "max_error_255"), label.to_owned())
+        }),
+    }
 }
 
 /// What is drawn, as a peer reads it.

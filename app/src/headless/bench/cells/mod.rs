@@ -5,6 +5,7 @@
 //! have fewer cores than workers.
 
 mod beside;
+mod figures;
 mod scenes;
 
 use std::path::Path;
@@ -28,7 +29,7 @@ const WORKERS: [usize; 4] = [1, 2, 4, 8];
 /// One pixel in so many is compared with the reference.
 const COMPARED: usize = 97;
 
-/// Cubes across the made grid: 302,670 tetrahedra.
+/// Cubes across the made grid: 305,046 tetrahedra.
 const MADE: usize = 41;
 
 /// Whether the transfer function is the dense one.
@@ -68,6 +69,9 @@ pub(super) fn run(data: Option<&Path>, peer: Option<&str>, bench: &mut Bench) ->
         for (view, along, size) in VIEWS {
             let camera = scenes::camera(&item.grid, along, size);
             levels(&mut renderer, &item, &camera, size, [opacity, view], bench)?;
+        }
+        if dense {
+            figures::run(&mut renderer, &item, bench)?;
         }
     }
     Ok(())
@@ -109,7 +113,7 @@ fn levels(
             let stats = &picture.stats;
             let work = stats.workers.iter().map(Counts::work).max().unwrap_or(0);
             bench.report(json!({
-                "bench": "cells", "opacity": opacity, "view": view, "size": size, "level": level, "workers": workers,
+                "bench": "cells", "figure": "tables", "opacity": opacity, "view": view, "size": size, "level": level, "workers": workers,
                 "tetrahedra": stats.tetrahedra, "threads_ms": least, "largest_work": work,
                 "imbalance": stats.imbalance(), "scanned": stats.total.scanned, "hidden": stats.total.hidden,
                 "clear": stats.total.clear, "outside": stats.total.outside, "segments": stats.total.segments,
@@ -122,19 +126,31 @@ fn levels(
     Ok(())
 }
 
-/// Largest work of a worker against how many there are.
-pub(super) fn charts(rows: &[Row]) -> Vec<(&'static str, Chart)> {
+/// What was measured, beside a peer or of ours alone.
+pub(super) fn charts(rows: &[Row], peer: bool) -> Vec<(&'static str, Chart)> {
+    if peer {
+        return vec![("cells_peer.svg", beside::chart(rows))];
+    }
+    // Of the dense scene along the grid, where termination has most to do.
+    let shown = |row: &&Row| {
+        [("figure", "tables"), ("opacity", "dense"), ("view", "B")]
+            .iter()
+            .all(|&(key, value)| row.get(key).is_some_and(|v| v == value))
+    };
+    let shown: Vec<Row> = rows.iter().filter(shown).cloned().collect();
     let work = Chart {
         title: "Cells: the busiest worker's work".to_owned(),
         x: "workers".to_owned(),
         y: "segments, and 4 a cell".to_owned(),
         y_scale: Scale::Log,
         joined: true,
-        series: series(rows, "line", &|row| {
+        series: series(&shown, "line", &|row| {
             (number(row, "workers"), number(row, "largest_work"), String::new())
         }),
     };
-    vec![("cells.svg", work)]
+    let mut charts = vec![("cells.svg", work)];
+    charts.extend(figures::charts(rows));
+    charts
 }
 
 /// Some pixels as the reference has them: one in so many.
