@@ -290,7 +290,8 @@ pub struct BenchArgs {
     /// For series and play: voxels along each axis for one of the data's, by interpolation.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
     pub enlarge: u8,
-    /// For pareto: a command that draws the case in turn with ours, such as "python3 tests/peers/vtk/volume.py".
+    /// For pareto and cells: a command that draws the same in turn with ours, such as "python3 tests/peers/vtk/volume.py" or
+    /// "python3 tests/peers/vtk/cells.py".
     #[arg(long, value_name = "COMMAND")]
     pub peer: Option<String>,
 }
@@ -312,7 +313,8 @@ pub enum BenchName {
     Pareto,
     /// What skipping saves, on data: nothing skipped, a changed transfer function, a moved cut, seven ways to cut.
     Skips,
-    /// Unstructured grids by cell projection: early termination, sharing and balancing, for 1 to 8 workers.
+    /// Unstructured grids by cell projection: early termination, sharing and balancing, for 1 to 8 workers; with a peer, ours
+    /// beside it instead.
     Cells,
 }
 

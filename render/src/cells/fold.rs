@@ -166,7 +166,7 @@ pub(super) fn integrate(
 
 /// Millimetres of a stretch of depth; beyond this much all is opaque or clear.
 #[inline(always)]
-fn length(depth: f64, stretch: f64) -> f32 {
+pub(super) fn length(depth: f64, stretch: f64) -> f32 {
     (depth * stretch).min(1e20) as f32
 }
 

@@ -8,7 +8,7 @@
 //!    enters and leaves it, and the scalar there. Exact predicates decide which rays those are, and neighbours agree to the
 //!    bit about depth and scalar on the face that they share: no ray passes between two cells or through both at once.
 //! 3. `table`, `fold`: each stretch is integrated for a scalar that runs linearly and the transfer function as it is; a
-//!    cluster's stretches are put in order for each pixel and merged where they meet.
+//!    cluster's stretches are merged in each pixel where they meet, and put in order.
 //! 4. `lists`, `early`: each worker keeps a list of [`Segment`]s for each pixel; clusters and cells behind what is opaque are
 //!    left out, if asked for ([`Early`]).
 //! 5. `worker`, `wire`, `link`, `engine`: workers share out clusters and exchange lists, by messages ([`Link`]); then the
@@ -297,6 +297,7 @@ impl CellRenderer {
         let prepared = self.prepare(std::slice::from_ref(item))?;
         let Some((clusters, scalars)) = prepared.into_iter().next() else { return Err(CellsError::Workers) };
         let prepare_ms = begin.elapsed().as_secs_f64() * 1e3;
+        let begin = Instant::now();
         Ok(Ready {
             clusters,
             scalars,
@@ -307,7 +308,7 @@ impl CellRenderer {
             skip_clear: options.skip_clear,
             wide: options.wide && has_wide(),
             prepare_ms,
-            begin: Instant::now(),
+            begin,
         })
     }
 

@@ -2,11 +2,11 @@
 
 use super::clusters::{Clusters, Scalars};
 use super::early;
-use super::fold::{Segment, Stops, add_up, integrate, merge, overlap, sort};
+use super::fold::{Segment, Stops, add_up, integrate, length, merge, overlap, sort, under};
 use super::lens::Lens;
-use super::scan::{Corner, Raw, Rect, scan};
+use super::scan::{Corner, Raw, Raws, Rect, scan};
 use super::stats::Counts;
-use super::table::Table;
+use super::table::{BATCH, Batch, Table};
 use crate::volume::cells::Place;
 
 /// Pixels that a cluster is drawn in at once, across and down: what it makes there has to be remembered.
@@ -34,6 +34,10 @@ impl<'a> Breaks<'a> {
         let own =
             self.starts.windows(2).all(|w| self.depths.get(w[0] as usize..w[1] as usize).is_some_and(rising));
         rising(self.planes) && own && (self.starts.is_empty() || self.starts.len() == pixels + 1)
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.planes.is_empty() && self.starts.is_empty()
     }
 
     pub(super) fn pixel(&self, pixel: usize) -> Stops<'a> {
@@ -85,7 +89,27 @@ impl Frame<'_> {
 struct Shown {
     tetrahedron: u32,
     reach: Rect,
+    /// Nearest and farthest depth, added.
+    depth: f64,
 }
+
+/// What a pixel has of a cluster while its tetrahedra are gone through.
+#[derive(Debug, Clone, Copy)]
+struct Open {
+    /// The run that was last gone on with; its back is less than nothing where there is none.
+    run: Segment,
+    /// Millimetres for one of depth.
+    stretch: f64,
+    /// The last of those put aside, or [`NONE`], or [`MIXED`].
+    aside: u32,
+}
+
+const NONE: u32 = u32::MAX;
+/// Cells overlap here: their stretches are needed one by one.
+const MIXED: u32 = u32::MAX - 1;
+
+/// Steps of depth in which tetrahedra are told apart for going through them from front to back.
+const STEPS: usize = 256;
 
 /// What the rays of a rectangle have of a grid.
 #[derive(Debug, Default)]
@@ -110,6 +134,11 @@ pub(super) struct Projector {
     values: Vec<f64>,
     corners: Vec<Corner>,
     shown: Vec<Shown>,
+    gathered: Box<Raws>,
+    nearest_first: Vec<Shown>,
+    open: Vec<Open>,
+    /// Runs put aside, each with the one before it.
+    aside: Vec<(Segment, u32)>,
     raws: Vec<Raw>,
     counts: Vec<u32>,
     ordered: Vec<Raw>,
@@ -208,7 +237,7 @@ impl Projector {
         }
         self.place(frame, cluster);
         self.choose(frame, cluster, rect, None, counts);
-        self.scan(frame, cluster, rect);
+        self.collect(frame, cluster, rect, None);
     }
 
     /// Brings corners and values of a cluster before the camera.
@@ -320,8 +349,37 @@ impl Projector {
                 continue;
             }
             counts.scanned += 1;
-            self.shown.push(Shown { tetrahedron: index as u32, reach: mine });
+            self.shown.push(Shown { tetrahedron: index as u32, reach: mine, depth: nearest + farthest });
         }
+        self.put_in_order();
+    }
+
+    /// Puts what is chosen roughly in order of depth: most stretches then go on where the one before ended.
+    #[inline(always)]
+    fn put_in_order(&mut self) {
+        let Some(&any) = self.shown.first() else { return };
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for shown in &self.shown {
+            (low, high) = (low.min(shown.depth), high.max(shown.depth));
+        }
+        let scale = if high > low { STEPS as f64 / (high - low) } else { 0.0 };
+        let step = |shown: &Shown| (((shown.depth - low) * scale) as usize).min(STEPS - 1);
+        let mut begins = [0_u32; STEPS];
+        for shown in &self.shown {
+            begins[step(shown)] += 1;
+        }
+        let mut begin = 0;
+        for count in &mut begins {
+            (*count, begin) = (begin, begin + *count);
+        }
+        self.nearest_first.clear();
+        self.nearest_first.resize(self.shown.len(), any);
+        for shown in &self.shown {
+            let place = &mut begins[step(shown)];
+            self.nearest_first[*place as usize] = *shown;
+            *place += 1;
+        }
+        std::mem::swap(&mut self.shown, &mut self.nearest_first);
     }
 
     /// Scan-converts what is chosen, in one tile, and merges it.
@@ -334,11 +392,119 @@ impl Projector {
         counts: &mut Counts,
         done: &mut impl FnMut(usize, Segment),
     ) {
+        if !frame.breaks.is_empty() {
+            self.one_by_one(frame, cluster, tile, None, counts, done);
+            return;
+        }
+        let none = Segment { front: -1.0, back: -1.0, rgba: [0.0; 4] };
+        self.open.clear();
+        for y in tile.low[1]..tile.high[1] {
+            let columns = tile.low[0]..tile.high[0];
+            let stretch = |x| frame.lens.stretch([x, y]);
+            self.open.extend(columns.map(|x| Open { run: none, stretch: stretch(x), aside: NONE }));
+        }
+        self.aside.clear();
+        let (open, aside) = (&mut self.open, &mut self.aside);
+        let constants = (frame.scalars.place() == Place::Cells).then_some(&self.values[..]);
+        let tetrahedra = frame.clusters.tetrahedra(cluster);
+        let mut go_on = |raws: &[Raw], constant: Option<f32>| {
+            counts.segments += raws.len() as u64;
+            go_on(frame, raws, constant, open, aside);
+        };
+        for shown in &self.shown {
+            let reach = shown.reach.meet(tile);
+            let index = shown.tetrahedron as usize;
+            let corners = tetrahedra[index].map(|v| &self.corners[v as usize]);
+            let constant = constants.map(|values| values[index] as f32);
+            scan(corners, [tile, &reach], &mut self.gathered, &mut |raws| go_on(raws, constant));
+            if constant.is_some() {
+                go_on(self.gathered.take(), constant);
+            }
+        }
+        go_on(self.gathered.take(), None);
+        let [across, _] = tile.size();
+        let mut mixed = false;
+        for (y, row) in (tile.low[1]..).zip(self.open.chunks_exact_mut(across)) {
+            let first = y as usize * frame.size[0] as usize;
+            for (x, open) in (tile.low[0]..).zip(row) {
+                if open.run.back < 0.0 {
+                    continue;
+                }
+                let mut done = |run: Segment| {
+                    if run.rgba[3] > 0.0 {
+                        counts.runs += 1;
+                        done(first + x as usize, run);
+                    }
+                };
+                if open.aside == NONE {
+                    done(open.run);
+                    continue;
+                }
+                self.spans.clear();
+                self.spans.push(open.run);
+                while let Some(&(run, before)) = self.aside.get(open.aside as usize) {
+                    self.spans.push(run);
+                    open.aside = before;
+                }
+                self.spans.sort_unstable_by(Segment::order);
+                if overlap(&self.spans) {
+                    (open.aside, mixed) = (MIXED, true);
+                } else {
+                    merge(&self.spans, &Stops::default(), done);
+                }
+            }
+        }
+        if mixed {
+            let open = std::mem::take(&mut self.open);
+            self.one_by_one(frame, cluster, tile, Some(&open), counts, done);
+            self.open = open;
+        }
+    }
+
+    /// Appends the stretches of what is chosen; of the mixed pixels of `only`, if given.
+    #[inline(always)]
+    fn collect(&mut self, frame: &Frame<'_>, cluster: usize, tile: &Rect, only: Option<&[Open]>) {
+        let tetrahedra = frame.clusters.tetrahedra(cluster);
+        let constant = frame.scalars.place() == Place::Cells;
+        for shown in &self.shown {
+            let reach = shown.reach.meet(tile);
+            let index = shown.tetrahedron as usize;
+            let corners = tetrahedra[index].map(|v| &self.corners[v as usize]);
+            let (totals, raws) = (&mut self.counts, &mut self.raws);
+            let mut keep = |found: &[Raw]| {
+                for &(mut raw) in found {
+                    if only.is_none_or(|open| open[raw.pixel as usize].aside == MIXED) {
+                        totals[raw.pixel as usize] += 1;
+                        if constant {
+                            raw.values = [self.values[index] as f32; 2];
+                        }
+                        raws.push(raw);
+                    }
+                }
+            };
+            scan(corners, [tile, &reach], &mut self.gathered, &mut keep);
+            keep(self.gathered.take());
+        }
+    }
+
+    /// The same with all stretches of a pixel put in order before they are integrated; of the mixed pixels of `only`, if given.
+    #[inline(never)]
+    fn one_by_one(
+        &mut self,
+        frame: &Frame<'_>,
+        cluster: usize,
+        tile: &Rect,
+        only: Option<&[Open]>,
+        counts: &mut Counts,
+        done: &mut impl FnMut(usize, Segment),
+    ) {
         self.counts.clear();
         self.counts.resize(tile.area(), 0);
         self.raws.clear();
-        self.scan(frame, cluster, tile);
-        counts.segments += self.raws.len() as u64;
+        self.collect(frame, cluster, tile, only);
+        if only.is_none() {
+            counts.segments += self.raws.len() as u64;
+        }
         if self.raws.is_empty() {
             return;
         }
@@ -372,20 +538,72 @@ impl Projector {
             }
         }
     }
+}
 
-    #[inline(always)]
-    fn scan(&mut self, frame: &Frame<'_>, cluster: usize, tile: &Rect) {
-        let tetrahedra = frame.clusters.tetrahedra(cluster);
-        let constant = frame.scalars.place() == Place::Cells;
-        for shown in &self.shown {
-            let reach = shown.reach.meet(tile);
-            if reach.is_empty() {
+/// Integrates stretches and goes on with the runs of their pixels.
+fn go_on(
+    frame: &Frame<'_>,
+    raws: &[Raw],
+    constant: Option<f32>,
+    open: &mut [Open],
+    aside: &mut Vec<(Segment, u32)>,
+) {
+    if !frame.wide {
+        go_on_by(frame.table, raws, constant, open, aside);
+        return;
+    }
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+        fn wide(
+            table: &Table,
+            raws: &[Raw],
+            constant: Option<f32>,
+            open: &mut [Open],
+            aside: &mut Vec<(Segment, u32)>,
+        ) {
+            go_on_by(table, raws, constant, open, aside);
+        }
+        #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
+        // SAFETY: `wide` is set only where these instructions were detected.
+        unsafe {
+            wide(frame.table, raws, constant, open, aside);
+        }
+    }
+}
+
+#[inline(always)]
+fn go_on_by(
+    table: &Table,
+    raws: &[Raw],
+    constant: Option<f32>,
+    open: &mut [Open],
+    aside: &mut Vec<(Segment, u32)>,
+) {
+    for batch in raws.chunks(BATCH) {
+        let (mut from, mut to, mut mm) = (Batch::of(0.0), Batch::of(0.0), Batch::of(0.0));
+        for (n, raw) in batch.iter().enumerate() {
+            [from.0[n], to.0[n]] = constant.map_or(raw.values, |value| [value; 2]);
+            mm.0[n] = length(raw.back - raw.front, open[raw.pixel as usize].stretch);
+        }
+        let mut seen = Batch::of([0.0; 4]);
+        table.segments([&from, &to], &mm, &mut seen);
+        for (raw, rgba) in batch.iter().zip(seen.0) {
+            let Open { run, aside: last, .. } = &mut open[raw.pixel as usize];
+            if raw.front == run.back {
+                under(&mut run.rgba, rgba);
+                run.back = raw.back;
                 continue;
             }
-            let index = shown.tetrahedron as usize;
-            let corners = tetrahedra[index].map(|v| &self.corners[v as usize]);
-            let value = constant.then(|| self.values[index] as f32);
-            scan(corners, value, [tile, &reach], &mut self.counts, &mut self.raws);
+            let mut new = Segment { front: raw.front, back: raw.back, rgba };
+            if raw.back == run.front {
+                under(&mut new.rgba, run.rgba);
+                new.back = run.back;
+            } else if run.back >= 0.0 {
+                aside.push((*run, *last));
+                *last = (aside.len() - 1) as u32;
+            }
+            *run = new;
         }
     }
 }

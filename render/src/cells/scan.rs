@@ -17,6 +17,11 @@ use std::cmp::Ordering;
 /// Pixels that go at once.
 const LANES: usize = 4;
 
+/// One of each pixel of a group, where no access of memory straddles two lines of a cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
+struct Lanes<T>([T; LANES]);
+
 /// A corner before the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Corner {
@@ -128,15 +133,56 @@ const fn passed() -> [u8; 64] {
     table
 }
 
-/// Adds what the rays of `reach`, which lies within `rect`, have of a tetrahedron. Its corners stand in the order of their
-/// numbers; `constant` is the cell's own value, where it has one. Each segment is counted at its pixel of `rect`.
+/// Areas below this are looked at by themselves: their products may underflow.
+const TINY: f64 = 1e-290;
+/// What is gathered before it is handed on.
+const GATHERED: usize = 256;
+
+/// What rays have of cells, gathered until there is enough of it.
+#[derive(Debug)]
+pub(super) struct Raws {
+    list: [Raw; GATHERED + LANES],
+    count: usize,
+}
+
+impl Default for Raws {
+    fn default() -> Self {
+        let none = Raw { front: 0.0, back: 0.0, values: [0.0; 2], pixel: 0 };
+        Self { list: [none; GATHERED + LANES], count: 0 }
+    }
+}
+
+impl Raws {
+    /// Takes out what is there.
+    #[inline(always)]
+    pub(super) fn take(&mut self) -> &[Raw] {
+        &self.list[..std::mem::take(&mut self.count)]
+    }
+
+    /// Adds where a ray passes two faces, if it does so before the eye.
+    #[inline(always)]
+    fn add(&mut self, pixel: u32, [a, b]: [[f64; 2]; 2]) {
+        let [mut front, mut from] = if a[0] <= b[0] { a } else { b };
+        let [back, to] = if a[0] <= b[0] { b } else { a };
+        if back > 0.0 && back > front {
+            if front < 0.0 {
+                from += (to - from) * (front / (front - back));
+                front = 0.0;
+            }
+            self.list[self.count] = Raw { front, back, values: [from as f32, to as f32], pixel };
+            self.count += 1;
+        }
+    }
+}
+
+/// Finds what the rays of `reach`, which lies within `rect`, have of a tetrahedron. Its corners stand in the order of their
+/// numbers. Pixels are counted in `rect`. Whenever much is gathered it goes to `full`; what is left stays in `raws`.
 #[inline(always)]
 pub(super) fn scan(
     corners: [&Corner; 4],
-    constant: Option<f32>,
     [rect, reach]: [&Rect; 2],
-    counts: &mut [u32],
-    found: &mut Vec<Raw>,
+    raws: &mut Raws,
+    full: &mut impl FnMut(&[Raw]),
 ) {
     let fields = corners.map(|c| [c.weight, c.depth, c.value]);
     let width = rect.high[0] - rect.low[0];
@@ -145,69 +191,135 @@ pub(super) fn scan(
         let y = corners.map(|c| c.y - f64::from(j) * c.w);
         let mut i = reach.low[0];
         while i < reach.high[0] {
-            let mut x = [[0.0; LANES]; 4];
+            let mut x = [Lanes([0.0; LANES]); 4];
             for (x, c) in x.iter_mut().zip(corners) {
-                for (lane, x) in x.iter_mut().enumerate() {
+                for (lane, x) in x.0.iter_mut().enumerate() {
                     *x = c.x - f64::from(i + lane as i32) * c.w;
                 }
             }
-            let mut areas = [[0.0; LANES]; 6];
-            let mut sides = [0_u64; LANES];
-            let mut least = [f64::INFINITY; LANES];
+            let mut areas = [Lanes([0.0; LANES]); 6];
+            // All bits set where the area is less than nothing.
+            let mut sides = [Lanes([0_u64; LANES]); 6];
+            let mut least = Lanes([f64::INFINITY; LANES]);
             for (edge, [a, b]) in EDGES.into_iter().enumerate() {
                 for lane in 0..LANES {
-                    let area = x[a][lane] * y[b] - y[a] * x[b][lane];
-                    sides[lane] |= (area.to_bits() >> 63) << edge;
+                    let area = x[a].0[lane] * y[b] - y[a] * x[b].0[lane];
+                    sides[edge].0[lane] = ((area.to_bits() as i64) >> 63) as u64;
                     let size = area.abs();
-                    areas[edge][lane] = size;
-                    least[lane] = if size < least[lane] { size } else { least[lane] };
+                    areas[edge].0[lane] = size;
+                    least.0[lane] = if size < least.0[lane] { size } else { least.0[lane] };
                 }
             }
             let lanes = LANES.min((reach.high[0] - i) as usize);
-            if least.contains(&0.0) {
-                for lane in (0..lanes).filter(|&lane| least[lane] == 0.0) {
-                    sides[lane] = exact_sides(&corners, [i + lane as i32, j]);
+            let first = (row + i) as u32;
+            if least.0.iter().any(|&least| least < TINY) {
+                for lane in 0..lanes {
+                    let code = exact_sides(&corners, [i + lane as i32, j]);
+                    let faces = PASSED[(code & 63) as usize];
+                    if faces != MISS {
+                        let of = |face| pass(&fields, face, &areas, lane);
+                        raws.add(first + lane as u32, [of(faces >> 2), of(faces)]);
+                    }
                 }
+            } else {
+                pass_all(&fields, &areas, &sides, first, lanes, raws);
             }
-            // Which lanes pass is as good as random: found without a branch for each.
-            let passed = sides.map(|sides| PASSED[(sides & 63) as usize]);
-            let mut left = 0;
-            for (lane, faces) in passed.iter().enumerate() {
-                left |= u32::from(*faces != MISS) << lane;
-            }
-            left &= (1 << lanes) - 1;
-            while left != 0 {
-                let lane = left.trailing_zeros() as usize & (LANES - 1);
-                left &= left - 1;
-                let faces = passed[lane];
-                let a = pass(&fields, faces >> 2, &areas, lane);
-                let b = pass(&fields, faces, &areas, lane);
-                let in_order = a[0] <= b[0];
-                let [mut front, mut from] = if in_order { a } else { b };
-                let [back, to] = if in_order { b } else { a };
-                if !(back > 0.0 && back > front) {
-                    continue;
-                }
-                if front < 0.0 {
-                    from += (to - from) * (front / (front - back));
-                    front = 0.0;
-                }
-                let pixel = (row + i + lane as i32) as u32;
-                let values = constant.map_or([from as f32, to as f32], |value| [value; 2]);
-                counts[pixel as usize] += 1;
-                found.push(Raw { front, back, values, pixel });
+            if raws.count >= GATHERED {
+                full(raws.take());
             }
             i += LANES as i32;
         }
     }
 }
 
+/// Which faces the rays of a group pass, and where: without a branch for each ray, since which do is as good as random.
+#[inline(always)]
+fn pass_all(
+    fields: &[[f64; 3]; 4],
+    areas: &[Lanes<f64>; 6],
+    sides: &[Lanes<u64>; 6],
+    first: u32,
+    lanes: usize,
+    raws: &mut Raws,
+) {
+    // By the way that a ray passes, in or out: the faces passed so, and the weights of the corners there.
+    let mut passed = [[Lanes([0_u64; LANES]); 4]; 2];
+    let mut any = [Lanes([0_u64; LANES]); 2];
+    for (face, (_, [jk, ik, ij])) in FACES.iter().enumerate() {
+        let turned = if face % 2 == 1 { u64::MAX } else { 0 };
+        for lane in 0..LANES {
+            let [jk, ik, ij] = [sides[*jk].0[lane], sides[*ik].0[lane], sides[*ij].0[lane]];
+            let passes = (ij ^ ik) & !(ij ^ jk);
+            passed[0][face].0[lane] = passes & (ij ^ turned);
+            passed[1][face].0[lane] = passes & !(ij ^ turned);
+            any[0].0[lane] |= passed[0][face].0[lane];
+            any[1].0[lane] |= passed[1][face].0[lane];
+        }
+    }
+    let mut hit = [0_u64; LANES];
+    for lane in 0..LANES {
+        hit[lane] = any[0].0[lane] & any[1].0[lane];
+    }
+    if hit[0] | hit[1] | hit[2] | hit[3] == 0 {
+        return;
+    }
+    let mut depths = [Lanes([0.0; LANES]); 2];
+    let mut values = [Lanes([0.0; LANES]); 2];
+    for way in 0..2 {
+        let mut weights = [Lanes([0_u64; LANES]); 4];
+        for (face, (corners, across)) in FACES.iter().enumerate() {
+            for (corner, edge) in corners.iter().zip(across) {
+                for lane in 0..LANES {
+                    weights[*corner].0[lane] |= passed[way][face].0[lane] & areas[*edge].0[lane].to_bits();
+                }
+            }
+        }
+        let mut sums = [Lanes([0.0; LANES]); 3];
+        for (corner, field) in fields.iter().enumerate() {
+            for (sum, field) in sums.iter_mut().zip(field) {
+                for lane in 0..LANES {
+                    let term = f64::from_bits(weights[corner].0[lane]) * field;
+                    sum.0[lane] = if corner == 0 { term } else { sum.0[lane] + term };
+                }
+            }
+        }
+        for lane in 0..LANES {
+            let part = 1.0 / sums[0].0[lane];
+            depths[way].0[lane] = sums[1].0[lane] * part;
+            values[way].0[lane] = sums[2].0[lane] * part;
+        }
+    }
+    let (mut fronts, mut backs) = ([0.0; LANES], [0.0; LANES]);
+    let (mut from, mut to) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+    for lane in 0..LANES {
+        let in_order = depths[0].0[lane] <= depths[1].0[lane];
+        fronts[lane] = if in_order { depths[0].0[lane] } else { depths[1].0[lane] };
+        backs[lane] = if in_order { depths[1].0[lane] } else { depths[0].0[lane] };
+        from[lane] = if in_order { values[0].0[lane] } else { values[1].0[lane] } as f32;
+        to[lane] = if in_order { values[1].0[lane] } else { values[0].0[lane] } as f32;
+    }
+    if fronts.iter().any(|&front| front < 0.0) {
+        for lane in (0..lanes).filter(|&lane| hit[lane] != 0) {
+            let of = |way: usize| [depths[way].0[lane], values[way].0[lane]];
+            raws.add(first + lane as u32, [of(0), of(1)]);
+        }
+        return;
+    }
+    for lane in 0..LANES {
+        let values = [from[lane], to[lane]];
+        raws.list[raws.count] =
+            Raw { front: fronts[lane], back: backs[lane], values, pixel: first + lane as u32 };
+        let counts = (hit[lane] != 0) & (backs[lane] > fronts[lane]) & (lane < lanes);
+        raws.count += usize::from(counts);
+    }
+}
+
 /// Depth and scalar where a ray passes a face; `fields` are weight, depth and value of each corner.
 #[inline(always)]
-fn pass(fields: &[[f64; 3]; 4], face: u8, areas: &[[f64; LANES]; 6], lane: usize) -> [f64; 2] {
+fn pass(fields: &[[f64; 3]; 4], face: u8, areas: &[Lanes<f64>; 6], lane: usize) -> [f64; 2] {
     let ([i, j, k], across) = &FACES[usize::from(face & 3)];
-    let [p, q, r] = [&fields[*i], &fields[*j], &fields[*k]];
-    let [a, b, c] = [areas[across[0]][lane], areas[across[1]][lane], areas[across[2]][lane]];
+    let [p, q, r] = [&fields[*i & 3], &fields[*j & 3], &fields[*k & 3]];
+    let [a, b, c] = [areas[across[0]].0[lane], areas[across[1]].0[lane], areas[across[2]].0[lane]];
     let weight = a * p[0] + b * q[0] + c * r[0];
     let depth = a * p[1] + b * q[1] + c * r[1];
     let value = a * p[2] + b * q[2] + c * r[2];

@@ -5,7 +5,7 @@ use super::project::Frame;
 /// Which clusters a worker begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Spread {
-    /// Those of one part of the picture, from front to back: what is opaque in front hides what is behind it without a word
+    /// Those of one band of the picture, from front to back: what is opaque in front hides what is behind it without a word
     /// to another worker.
     #[default]
     Columns,
@@ -19,27 +19,15 @@ pub(super) fn queues(frame: &Frame<'_>, workers: usize, spread: Spread) -> Vec<V
     let mut all: Vec<u32> = (0..frame.clusters.len() as u32).collect();
     let mut queues = vec![Vec::new(); workers];
     if spread == Spread::Columns {
-        // Halves of halves of the picture, for halves of the workers.
-        let middle = |cluster: u32, axis: usize| {
+        // Bands of rows from the top, as they are composited in the end, so that few segments go from one to another.
+        let middle = |cluster: u32| {
             let (rect, _) = &reaches[cluster as usize];
-            i64::from(rect.low[axis]) + i64::from(rect.high[axis])
+            i64::from(rect.low[1]) + i64::from(rect.high[1])
         };
-        let mut open = vec![(&mut all[..], workers, 0)];
-        while let Some((list, count, first)) = open.pop() {
-            if count == 1 {
-                queues[first].extend_from_slice(list);
-                continue;
-            }
-            let extent = |axis: usize| {
-                let of = || list.iter().map(|&cluster| middle(cluster, axis));
-                of().max().unwrap_or(0) - of().min().unwrap_or(0)
-            };
-            let axis = usize::from(extent(1) > extent(0));
-            list.sort_unstable_by_key(|&cluster| (middle(cluster, axis), cluster));
-            let lower = count / 2;
-            let (a, b) = list.split_at_mut(list.len() * lower / count);
-            open.push((b, count - lower, first + lower));
-            open.push((a, lower, first));
+        all.sort_unstable_by_key(|&cluster| (middle(cluster), cluster));
+        for (worker, queue) in queues.iter_mut().enumerate() {
+            let [from, to] = [worker, worker + 1].map(|w| all.len() * w / workers);
+            queue.extend_from_slice(&all[from..to]);
         }
     } else {
         let total: usize = (0..frame.clusters.len()).map(|c| frame.clusters.count(c)).sum();

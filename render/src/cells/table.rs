@@ -20,6 +20,10 @@ const EVEN_COLOR: f32 = 0.005;
 const EVEN_DEPTH: f32 = 0.02;
 /// In how many parts a piece goes at most; such a one is opaque long before its end.
 const PARTS: f32 = 1024.0;
+/// Segments that go at once.
+pub(super) const BATCH: usize = 8;
+/// Optical depth below which a series is as good as the exponential.
+const THIN: f32 = 0.25;
 /// What lets less through ends a segment.
 const DARK: f32 = 1e-6;
 /// Differences below this part of a node have lost their digits.
@@ -34,6 +38,18 @@ struct Node {
     from: [f32; 4],
     /// Half of the rise to the next node, such that the sum there is met.
     half_rise: [f32; 4],
+}
+
+impl Node {
+    /// The antiderivative so many nodes behind it.
+    #[inline(always)]
+    fn sum(&self, part: f32, width: f32) -> [f64; 4] {
+        let mut sum = self.sum;
+        for c in 0..4 {
+            sum[c] += f64::from(part * (self.from[c] + part * self.half_rise[c]) * width);
+        }
+        sum
+    }
 }
 
 /// Values between two control points, the first of them with it.
@@ -52,6 +68,8 @@ struct Piece {
     /// How much colour has varied up to the origin, and goes on to.
     varied: f32,
     varies: f32,
+    /// The most that extinction changes for one of position, times how much colour does.
+    rough: f32,
 }
 
 /// A place in the table.
@@ -61,6 +79,29 @@ pub(super) struct Place {
     piece: usize,
     sum: [f64; 4],
     varied: f32,
+}
+
+/// One of each of several segments, where no access of memory straddles two lines of a cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
+pub(super) struct Batch<T>(pub(super) [T; BATCH]);
+
+impl<T: Copy> Batch<T> {
+    /// The same for all.
+    #[inline(always)]
+    pub(super) fn of(all: T) -> Self {
+        Self([all; BATCH])
+    }
+}
+
+/// Several places.
+#[derive(Debug)]
+struct Places {
+    piece: Batch<u32>,
+    node: Batch<u32>,
+    /// How many nodes behind its node.
+    part: Batch<f32>,
+    varied: Batch<f32>,
 }
 
 /// A transfer function; a *position* is a value counted from the first control point, the span of all being 1.
@@ -143,10 +184,12 @@ impl Table {
             [r * tau, g * tau, b * tau, tau]
         };
         let first = self.nodes.len() as u32;
+        let mut steepest = 0.0_f64;
         for node in 0..count {
             let [from, to] = [node, node + 1].map(|n| n as f64 / count as f64);
             let mean = if changes { mean(&rate, [from, to]) } else { rate(0.0) };
             let begin = rate(from);
+            steepest = steepest.max(2.0 * (mean[3] - begin[3]).abs() / width);
             self.nodes.push(Node {
                 sum: *sum,
                 from: begin.map(|v| v as f32),
@@ -177,6 +220,7 @@ impl Table {
             slope,
             varied,
             varies: most(slope),
+            rough: steepest as f32 * most(slope),
         });
     }
 
@@ -203,9 +247,7 @@ impl Table {
     #[inline(always)]
     fn sum(&self, piece: &Piece, position: f32) -> [f64; 4] {
         let (node, part) = self.node(piece, position);
-        std::array::from_fn(|c| {
-            node.sum[c] + f64::from(part * (node.from[c] + part * node.half_rise[c]) * piece.width)
-        })
+        node.sum(part, piece.width)
     }
 
     #[inline(always)]
@@ -235,6 +277,95 @@ impl Table {
         if position == near.position { *near } else { self.find(position, near.piece) }
     }
 
+    /// Looks positions up.
+    #[inline(always)]
+    fn places(&self, positions: &Batch<f32>) -> Places {
+        let mut piece = Batch::of(0_u32);
+        for next in self.pieces.iter().skip(1) {
+            for n in 0..BATCH {
+                piece.0[n] += u32::from(positions.0[n] >= next.from);
+            }
+        }
+        let mut node = Batch::of(0_u32);
+        let mut part = Batch::of(0.0);
+        let mut varied = Batch::of(0.0);
+        let (mut last, mut first) = (Batch::of(0.0), Batch::of(0));
+        for n in 0..BATCH {
+            let p = &self.pieces[piece.0[n] as usize];
+            part.0[n] = (positions.0[n] - p.origin) * p.scale;
+            (first.0[n], last.0[n]) = (p.first, (p.last - p.first) as f32);
+            varied.0[n] =
+                p.varied + if p.varies > 0.0 { p.varies * (positions.0[n] - p.origin) } else { 0.0 };
+        }
+        for n in 0..BATCH {
+            let index = part.0[n].max(0.0).min(last.0[n]) as u32;
+            part.0[n] -= index as f32;
+            node.0[n] = first.0[n] + index;
+        }
+        Places { piece, node, part, varied }
+    }
+
+    /// As [`Self::segment`], of several at once.
+    #[inline(always)]
+    pub(super) fn segments(&self, [from, to]: [&Batch<f32>; 2], mm: &Batch<f32>, seen: &mut Batch<[f32; 4]>) {
+        let (a, b) = (self.places(from), self.places(to));
+        let mut tau = Batch::of(0.0);
+        let mut rise = Batch::of(0.0);
+        let mut by = Batch::of(0.0);
+        let mut still = Batch::of(0_u32);
+        for n in 0..BATCH {
+            rise.0[n] = to.0[n] - from.0[n];
+            by.0[n] = mm.0[n] / rise.0[n];
+        }
+        for n in 0..BATCH {
+            let [p, q] = [&a, &b].map(|places| &self.pieces[places.piece.0[n] as usize]);
+            if rise.0[n].abs() * p.scale.min(q.scale) > STILL {
+                let near = self.nodes[a.node.0[n] as usize].sum(a.part.0[n], p.width);
+                let far = self.nodes[b.node.0[n] as usize].sum(b.part.0[n], q.width);
+                for c in 0..4 {
+                    seen.0[n][c] = (far[c] - near[c]) as f32 * by.0[n];
+                }
+            } else {
+                seen.0[n] = self.rate(p, from.0[n] + 0.5 * rise.0[n]).map(|v| v * mm.0[n]);
+                still.0[n] = u32::MAX;
+            }
+            tau.0[n] = seen.0[n][3];
+        }
+        let mut rough = Batch::of(0.0);
+        let mut across = Batch::of(0);
+        for n in 0..BATCH {
+            rough.0[n] = self.pieces[a.piece.0[n] as usize].rough * mm.0[n];
+            across.0[n] = a.piece.0[n] ^ b.piece.0[n];
+        }
+        let mut alone = Batch::of(0_u32);
+        let mut part = Batch::of(0.0);
+        let mut lags = Batch::of(0.0);
+        for n in 0..BATCH {
+            let t = tau.0[n];
+            let opacity = opacity(t);
+            let uneven = t * (b.varied.0[n] - a.varied.0[n]).abs() > EVEN_COLOR;
+            let smooth = rough.0[n] * (rise.0[n] * rise.0[n]) <= EVEN_DEPTH;
+            // What changes too much, or passes between pieces where they are near, is seen to by itself.
+            let much = if smooth { across.0[n] } else { 1 };
+            alone.0[n] = if uneven { much } else { across.0[n] & still.0[n] };
+            part.0[n] = if t > 0.0 { opacity / t } else { 0.0 };
+            lags.0[n] = if uneven { rise.0[n] * behind(t, opacity) } else { 0.0 };
+            tau.0[n] = if t > 0.0 { opacity } else { 0.0 };
+        }
+        for n in 0..BATCH {
+            let slope = &self.pieces[a.piece.0[n] as usize].slope;
+            let depth = seen.0[n];
+            for c in 0..3 {
+                seen.0[n][c] = depth[c] * part.0[n] + slope[c] * lags.0[n];
+            }
+            seen.0[n][3] = tau.0[n];
+        }
+        for n in (0..BATCH).filter(|&n| alone.0[n] != 0) {
+            let [a, b] = [(from, &a), (to, &b)].map(|(x, p)| self.find(x.0[n], p.piece.0[n] as usize));
+            seen.0[n] = self.segment(&a, &b, mm.0[n]);
+        }
+    }
+
     /// A place to begin a search with.
     pub(super) fn start(&self) -> &Place {
         &self.start
@@ -249,12 +380,21 @@ impl Table {
         if tau <= 0.0 || tau.is_nan() {
             return [0.0; 4];
         }
-        if tau * (to.varied - from.varied).abs() > EVEN_COLOR && rise != 0.0 {
-            return self.in_parts(from, to, mm);
-        }
         let opacity = opacity(tau);
         let part = opacity / tau;
-        [depth[0] * part, depth[1] * part, depth[2] * part, opacity]
+        let mut seen = [depth[0] * part, depth[1] * part, depth[2] * part, opacity];
+        if tau * (to.varied - from.varied).abs() > EVEN_COLOR && rise != 0.0 {
+            let piece = &self.pieces[from.piece];
+            let smooth = piece.rough * mm * (rise * rise) <= EVEN_DEPTH;
+            if from.piece != to.piece || !smooth {
+                return self.in_parts(from, to, mm);
+            }
+            let behind = behind(tau, opacity);
+            for c in 0..3 {
+                seen[c] += piece.slope[c] * rise * behind;
+            }
+        }
+        seen
     }
 
     /// Optical depth times colour, and optical depth.
@@ -329,20 +469,17 @@ impl Table {
         let rough = change * piece.varies * (to - from).abs() / EVEN_DEPTH;
         let parts = rough.sqrt().ceil().clamp(1.0, PARTS);
         let mut at = from;
-        let mut begin = self.place(piece, from);
+        let index = self.pieces.partition_point(|p| p.first < piece.first);
+        let place = |position| Place { position, piece: index, sum: self.sum(piece, position), varied: 0.0 };
+        let mut begin = place(from);
         for n in 1..=parts as u32 {
             let end = if n as f32 == parts { to } else { from + (to - from) * (n as f32 / parts) };
-            let finish = self.place(piece, end);
+            let finish = place(end);
             let depth = self.depth(&begin, &finish, per_position * (end - at));
             let tau = depth[3];
             if tau > 0.0 {
                 let opacity = opacity(tau);
-                // By how much the share of the colour at the end falls behind that at the begin.
-                let behind = if tau < 0.05 {
-                    tau * tau * (tau * (1.0 / 24.0) - 1.0 / 12.0)
-                } else {
-                    opacity / tau - 1.0 + 0.5 * opacity
-                };
+                let behind = behind(tau, opacity);
                 let through = 1.0 - got[3];
                 let rise = end - at;
                 for c in 0..3 {
@@ -356,11 +493,6 @@ impl Table {
             }
             (at, begin) = (end, finish);
         }
-    }
-
-    fn place(&self, piece: &Piece, position: f32) -> Place {
-        let index = self.pieces.partition_point(|p| p.first < piece.first);
-        Place { position, piece: index, sum: self.sum(piece, position), varied: 0.0 }
     }
 }
 
@@ -389,12 +521,35 @@ fn mean(rate: &impl Fn(f64) -> [f64; 4], [from, to]: [f64; 2]) -> [f64; 4] {
     })
 }
 
+/// By how much the share of the colour at the end of a stretch falls behind that at its begin.
+#[inline(always)]
+fn behind(tau: f32, opacity: f32) -> f32 {
+    if tau < 0.05 {
+        tau * tau * (tau * (1.0 / 24.0) - 1.0 / 12.0)
+    } else {
+        opacity / tau - 1.0 + 0.5 * opacity
+    }
+}
+
 /// 1 - e^-τ, without loss where τ is small.
 #[inline(always)]
 pub(super) fn opacity(tau: f32) -> f32 {
-    if tau < 0.25 {
-        let series = 1.0 - tau * (1.0 / 3.0 - tau * (1.0 / 12.0 - tau * (1.0 / 60.0 - tau * (1.0 / 360.0))));
-        return tau - 0.5 * tau * tau * series;
-    }
-    1.0 - (-tau).exp()
+    let series = 1.0 - tau * (1.0 / 3.0 - tau * (1.0 / 12.0 - tau * (1.0 / 60.0 - tau * (1.0 / 360.0))));
+    let thin = tau - 0.5 * tau * tau * series;
+    let thick = 1.0 - exp_minus(tau);
+    if tau < THIN { thin } else { thick }
+}
+
+/// e^-τ for τ ≥ 0, by arithmetic alone: several go at once.
+#[inline(always)]
+fn exp_minus(tau: f32) -> f32 {
+    // ln 2 in two parts, the first of few digits, so that its multiples are exact.
+    const LN_2: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
+    let tau = if tau < 87.0 { tau } else { 87.0 };
+    let halvings = (tau * std::f32::consts::LOG2_E + 0.5) as i32;
+    let count = halvings as f32;
+    let rest = (count * LN_2[0] - tau) + count * LN_2[1];
+    let series = rest * (1.0 / 6.0 + rest * (1.0 / 24.0 + rest * (1.0 / 120.0 + rest * (1.0 / 720.0))));
+    let power = 1.0 + rest * (1.0 + rest * (0.5 + series));
+    power * f32::from_bits(((127 - halvings) as u32) << 23)
 }

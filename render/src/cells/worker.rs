@@ -459,6 +459,8 @@ impl<'a, L: Link> Worker<'a, L> {
             let pixel = y * width + x;
             list.clear();
             list.extend(self.lists.pixel(pixel));
+            // The nearest clusters came first, and lists begin with what came last.
+            list.reverse();
             list.sort_unstable_by(Segment::order);
             if overlap(&list) {
                 self.count().overlapping_pixels += 1;

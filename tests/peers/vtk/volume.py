@@ -135,37 +135,24 @@ def mapper_of(name, step_mm, threads):
     return mapper
 
 
-class Peer:
+class Window:
     """A window of VTK's own, off screen, with one volume in it."""
 
-    def __init__(self, args):
-        case = json.loads(args.case.read_text())
-        shown = [v for v in case["volumes"] if v.get("visible", True)]
-        if len(shown) != 1 or case.get("fragments") or case.get("implants"):
-            refuse("a case of one volume without fragments and implants is needed")
-        volume = shown[0]
-        if volume.get("shading", "none") != "none":
-            refuse("the volume is shaded; set its shading to none")
-        samples, matrix = volume_of(args.case.parent / volume["source"])
-        pose = np.array(volume.get("pose", np.eye(4).ravel()), float).reshape(4, 4)
-        image, place, finest = image_data(samples, pose @ matrix)
-        self.step_mm = finest * args.step
-        self.mapper = mapper_of(args.mapper, self.step_mm, args.threads)
-        self.mapper.SetInputData(image)
-        actor = vtk.vtkVolume()
-        actor.SetMapper(self.mapper)
-        actor.SetProperty(properties(volume["transfer"]))
-        actor.SetUserMatrix(vtk_matrix(place))
+    def __init__(self, mapper, data, transfer, size):
+        self.mapper = mapper
+        mapper.SetInputData(data)
+        self.actor = vtk.vtkVolume()
+        self.actor.SetMapper(mapper)
+        self.actor.SetProperty(properties(transfer))
         self.renderer = vtk.vtkRenderer()
         self.renderer.SetBackground(0, 0, 0)
-        self.renderer.AddVolume(actor)
+        self.renderer.AddVolume(self.actor)
         self.window = vtk.vtkRenderWindow()
         self.window.SetOffScreenRendering(1)
         self.window.SetMultiSamples(0)
         self.window.SetAlphaBitPlanes(1)
-        self.window.SetSize(*args.size)
+        self.window.SetSize(*size)
         self.window.AddRenderer(self.renderer)
-        self.aim(case["camera"])
 
     def aim(self, camera):
         """Sets the view; the clipping range holds the whole volume and does not move."""
@@ -183,7 +170,6 @@ class Peer:
     def frame_ms(self):
         """Draws a whole frame, waits until it is drawn, and returns the milliseconds."""
         self.renderer.Modified()
-        self.mapper.Modified()
         begin = time.perf_counter()
         self.window.Render()
         self.window.WaitForCompletion()
@@ -196,6 +182,32 @@ class Peer:
         self.window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, grab)
         pixels = numpy_support.vtk_to_numpy(grab).reshape(height, width, 4)
         return (pixels[::-1] / np.float32(255)).astype(np.float32)
+
+
+class Peer(Window):
+    """A window with the volume of a case."""
+
+    def __init__(self, args):
+        case = json.loads(args.case.read_text())
+        shown = [v for v in case["volumes"] if v.get("visible", True)]
+        if len(shown) != 1 or case.get("fragments") or case.get("implants"):
+            refuse("a case of one volume without fragments and implants is needed")
+        volume = shown[0]
+        if volume.get("shading", "none") != "none":
+            refuse("the volume is shaded; set its shading to none")
+        samples, matrix = volume_of(args.case.parent / volume["source"])
+        pose = np.array(volume.get("pose", np.eye(4).ravel()), float).reshape(4, 4)
+        image, place, finest = image_data(samples, pose @ matrix)
+        self.step_mm = finest * args.step
+        mapper = mapper_of(args.mapper, self.step_mm, args.threads)
+        super().__init__(mapper, image, volume["transfer"], args.size)
+        self.actor.SetUserMatrix(vtk_matrix(place))
+        self.aim(case["camera"])
+
+    def frame_ms(self):
+        """The same, with nothing kept from the frame before."""
+        self.mapper.Modified()
+        return super().frame_ms()
 
     def float_picture(self):
         """The same drawn once more through a float target, so that 8 bits hide nothing."""
@@ -253,14 +265,10 @@ class Peer:
             np.save(path, self.float_picture())
 
 
-def arguments():
-    """What was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("case", type=Path)
-    parser.add_argument("--mapper", choices=["gpu", "fixed"], default="gpu")
-    parser.add_argument("--step", type=float, default=1.0, help="sample distance; voxels of the smallest spacing")
+def arguments(parser):
+    """What can be asked for of any peer here."""
     parser.add_argument("--size", type=lambda text: [int(n) for n in text.split("x")], default=[512, 512])
-    parser.add_argument("--threads", type=int, default=2, help="of the fixed-point mapper")
+    parser.add_argument("--threads", type=int, default=2, help="of mappers that have threads of their own")
     parser.add_argument("--frames", type=int, default=7)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--float", action="store_true", help="the picture before it is rounded to the window's 8 bits")
@@ -268,10 +276,8 @@ def arguments():
     return parser.parse_args()
 
 
-def main():
-    """Draws, by the line or at once."""
-    args = arguments()
-    peer = Peer(args)
+def run(peer, args, report):
+    """Draws, by the line or at once; then `report` is printed with the times."""
     for _ in range(WARM_FRAMES):
         peer.frame_ms()
     if args.serve:
@@ -289,9 +295,20 @@ def main():
     times = sorted(peer.frame_ms() for _ in range(args.frames))
     if args.out:
         peer.write(args.out, args.float)
-    report = {"peer": f"vtk {vtk.vtkVersion().GetVTKVersion()}", "mapper": args.mapper, "step_voxels": args.step}
-    report |= {"step_mm": peer.step_mm, "size": args.size, "frames": len(times)}
+    report = {"peer": f"vtk {vtk.vtkVersion().GetVTKVersion()}", "mapper": args.mapper} | report
+    report |= {"size": args.size, "frames": len(times)}
     print(json.dumps(report | {"min_ms": times[0], "median_ms": times[len(times) // 2]}))
+
+
+def main():
+    """A case's volume."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("case", type=Path)
+    parser.add_argument("--mapper", choices=["gpu", "fixed"], default="gpu")
+    parser.add_argument("--step", type=float, default=1.0, help="sample distance; voxels of the smallest spacing")
+    args = arguments(parser)
+    peer = Peer(args)
+    run(peer, args, {"step_voxels": args.step, "step_mm": peer.step_mm})
 
 
 if __name__ == "__main__":

@@ -67,8 +67,8 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
             Vec::new()
         }
         BenchName::Cells => {
-            cells::run(args.data.as_deref(), &mut bench)?;
-            vec![("cells.svg", cells::chart(&bench.rows))]
+            cells::run(args.data.as_deref(), args.peer.as_deref(), &mut bench)?;
+            cells::charts(&bench.rows, args.peer.is_some())
         }
         BenchName::Pareto => {
             let case = args.data.as_deref().filter(|path| input::is_case(path));

@@ -82,7 +82,7 @@ pub(super) fn run(
         let fault = "a peer draws a case file; name one with --data";
         let case = case.ok_or_else(|| Failure::Usage(fault.to_owned()))?;
         for (mapper, step) in PEERS {
-            let peer = Peer::start(command, case, mapper, step, SIZE)?;
+            let peer = Peer::start(command, case, mapper, Some(step), SIZE)?;
             entries.push(Entry::new(Way::Peer { peer, mapper, step }));
         }
     }

@@ -1,8 +1,8 @@
 //! A foreign renderer as a process that draws a frame whenever it is asked, so that both can take turns.
 //!
-//! It is started with a case file, `--mapper NAME`, `--step VOXELS`, `--size WxH`, `--float` and `--serve`; it says
-//! `ready`, then answers `render` by the milliseconds of one frame and `write FILE` by `ok`, the file being a `NumPy` array
-//! of `height`·`width`·4 floats. `tests/peers/vtk/volume.py` is one.
+//! It is started with a file that says what to draw, `--mapper NAME`, `--step VOXELS` where there are voxels, `--size WxH`,
+//! `--float` and `--serve`; it says `ready`, then answers `render` by the milliseconds of one frame and `write FILE` by `ok`,
+//! the file being a `NumPy` array of `height`·`width`·4 floats. `tests/peers/vtk/volume.py` and `cells.py` are such.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -21,20 +21,21 @@ pub(super) struct Peer {
 }
 
 impl Peer {
-    /// Starts `command`, words divided by spaces, for a case.
+    /// Starts `command`, words divided by spaces, for a case or another file.
     pub(super) fn start(
         command: &str,
-        case: &Path,
+        file: &Path,
         mapper: &str,
-        step: f64,
+        step: Option<f64>,
         [width, height]: [u32; 2],
     ) -> Result<Self, Failure> {
         let mut words = command.split_whitespace();
         let program = words.next().unwrap_or_default();
         let mut process = Command::new(program)
             .args(words)
-            .arg(case)
-            .args(["--mapper", mapper, "--step", &step.to_string(), "--size", &format!("{width}x{height}")])
+            .arg(file)
+            .args(["--mapper", mapper, "--size", &format!("{width}x{height}")])
+            .args(step.map(|step| format!("--step={step}")))
             .args(["--float", "--serve"])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -144,7 +145,8 @@ mod tests {
         let text = "echo ready\nwhile read line; do echo 12.5; done\n";
         std::fs::write(&script, text).expect("a script");
         let command = format!("sh {}", script.display());
-        let mut peer = Peer::start(&command, Path::new("case.json"), "gpu", 0.5, [1, 1]).expect("a peer");
+        let mut peer =
+            Peer::start(&command, Path::new("case.json"), "gpu", Some(0.5), [1, 1]).expect("a peer");
         assert_eq!(peer.frame_ms().expect("a time"), 12.5, "its answer");
         let wrong = peer.picture([1, 1]).expect_err("it wrote nothing").to_string();
         assert!(wrong.contains("12.5"), "the fault names the answer: {wrong}");
