@@ -8,7 +8,7 @@ use std::process::{Command, ExitCode};
 use std::sync::Arc;
 
 use render::cells::mpi::MpiLink;
-use render::cells::{Breaks, CellPicture, CellRenderer, Group, Link, LinkError, Options, Spread};
+use render::cells::{CellPicture, CellRenderer, Group, Link, LinkError, Options, Spread};
 use render::scene::{Camera, CellItem, Projection};
 use render::volume::cells::{CellGrid, CellKind, Field, Part, Place, Scalar, Step, Values};
 use render::volume::{Affine, ControlPoint, Point, Transfer, Vector};
@@ -52,8 +52,8 @@ fn run(what: &str) -> Result<String, Box<dyn std::error::Error>> {
         for balance in [true, false] {
             let options = Options { spread, balance, keep_segments: true, ..Options::default() };
             let all = |_: usize, _: usize| true;
-            let picture = group.render(&item, &camera, SIZE, &options, Breaks::default(), &all)?;
-            let by_threads = known.render(&item, &camera, SIZE, &options, Breaks::default(), &all)?;
+            let picture = group.render(&item, &camera, SIZE, &options, &all)?;
+            let by_threads = known.render(&item, &camera, SIZE, &options, &all)?;
             compare(&picture, &by_threads)?;
             bytes.push(picture.stats.total.bytes);
         }

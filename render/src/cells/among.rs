@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::clusters::{Clusters, Scalars};
 use super::lens::Lens;
-use super::project::{Breaks, Frame, Gathered, Projector};
+use super::project::{Frame, Gathered, Projector};
 use super::scan::{Raw, Rect};
 use super::stats::Counts;
 use super::table::{Place, Table};
@@ -61,7 +61,6 @@ impl Placed {
             table: &self.table,
             lens: self.lens,
             size: self.size,
-            breaks: Breaks::default(),
             skip_clear: self.skip_clear,
             wide: self.wide,
         }

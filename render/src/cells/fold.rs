@@ -42,19 +42,6 @@ impl Segment {
         let [r, g, b, _] = self.rgba.map(|v| f64::from(v) * part);
         [r, g, b, tau]
     }
-
-    /// The part of it between two depths, as if it were the same all along.
-    pub(super) fn between(&self, [near, far]: [f64; 2]) -> Option<Self> {
-        let (front, back) = (self.front.max(near), self.back.min(far));
-        if front >= back {
-            return None;
-        }
-        if front == self.front && back == self.back {
-            return Some(*self);
-        }
-        let share = (back - front) / (self.back - self.front);
-        Some(Self { front, back, rgba: seen(self.depth().map(|d| d * share)) })
-    }
 }
 
 /// Colour, premultiplied, and opacity of an optical depth, given with its product with colour.
@@ -74,30 +61,6 @@ pub(super) fn under(seen: &mut [f32; 4], behind: [f32; 4]) {
     let through = 1.0 - seen[3];
     for c in 0..4 {
         seen[c] += through * behind[c];
-    }
-}
-
-/// Depths of one pixel at which no segment may go on, rising: common to all pixels, and its own.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Stops<'a> {
-    pub(super) common: &'a [f64],
-    pub(super) own: &'a [f64],
-}
-
-impl Stops<'_> {
-    fn is_empty(&self) -> bool {
-        self.common.is_empty() && self.own.is_empty()
-    }
-
-    /// The first behind a depth.
-    fn after(&self, depth: f64) -> f64 {
-        let first = |list: &[f64]| list.get(list.partition_point(|&d| d <= depth)).copied();
-        first(self.common).unwrap_or(f64::INFINITY).min(first(self.own).unwrap_or(f64::INFINITY))
-    }
-
-    fn holds(&self, depth: f64) -> bool {
-        let holds = |list: &[f64]| list.binary_search_by(|d| d.total_cmp(&depth)).is_ok();
-        holds(self.common) || holds(self.own)
     }
 }
 
@@ -132,35 +95,15 @@ fn is_before(a: &Raw, b: &Raw) -> bool {
     rest(a) < rest(b)
 }
 
-/// Integrates what a ray has of cells, in their order; `stretch` is mm for one of depth. Segments are cut at `stops`.
+/// Integrates what a ray has of cells, in their order; `stretch` is mm for one of depth.
 #[inline(always)]
-pub(super) fn integrate(
-    raws: &[Raw],
-    table: &Table,
-    stretch: f64,
-    stops: &Stops<'_>,
-    into: &mut Vec<Segment>,
-) {
+pub(super) fn integrate(raws: &[Raw], table: &Table, stretch: f64, into: &mut Vec<Segment>) {
     let mut last = *table.start();
     for raw in raws {
-        let [a, b] = raw.values;
-        let mut from = table.at(a, &last);
-        let mut front = raw.front;
-        if !stops.is_empty() {
-            let mut stop = stops.after(front);
-            while stop < raw.back {
-                let part = (stop - raw.front) / (raw.back - raw.front);
-                let to = table.at(a + (b - a) * part as f32, &from);
-                let mm = length(stop - front, stretch);
-                into.push(Segment { front, back: stop, rgba: table.segment(&from, &to, mm) });
-                (front, from) = (stop, to);
-                stop = stops.after(front);
-            }
-        }
-        let to = table.at(b, &from);
-        let mm = length(raw.back - front, stretch);
-        into.push(Segment { front, back: raw.back, rgba: table.segment(&from, &to, mm) });
-        last = to;
+        let from = table.at(raw.values[0], &last);
+        last = table.at(raw.values[1], &from);
+        let rgba = table.segment(&from, &last, length(raw.back - raw.front, stretch));
+        into.push(Segment { front: raw.front, back: raw.back, rgba });
     }
 }
 
@@ -207,13 +150,13 @@ pub(super) fn add_up(segments: &mut Vec<Segment>) {
     }
 }
 
-/// Merges segments that meet, front to back, but not across `stops`.
+/// Merges segments that meet, front to back.
 #[inline(always)]
-pub(super) fn merge(segments: &[Segment], stops: &Stops<'_>, mut done: impl FnMut(Segment)) {
+pub(super) fn merge(segments: &[Segment], mut done: impl FnMut(Segment)) {
     let mut rest = segments.iter();
     let Some(mut run) = rest.next().copied() else { return };
     for next in rest {
-        if next.front == run.back && (stops.is_empty() || !stops.holds(run.back)) {
+        if next.front == run.back {
             under(&mut run.rgba, next.rgba);
             run.back = next.back;
         } else {

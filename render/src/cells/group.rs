@@ -11,7 +11,6 @@ use std::sync::{Arc, Weak};
 use super::clusters::Pack;
 use super::link::{Link, LinkError};
 use super::orders::{Drawing, Order};
-use super::project::Breaks;
 use super::serve::serve;
 use super::spread::queues;
 use super::stats::Counts;
@@ -80,14 +79,13 @@ impl<L: Link> Group<L> {
         camera: &Camera,
         size: [u32; 2],
         options: &Options,
-        breaks: Breaks<'_>,
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> Result<CellPicture, CellsError> {
         if let Some(lost) = &self.lost {
             return Err(lost.clone().into());
         }
         self.number += 1;
-        let ready = self.renderer.ready(item, camera, size, options, breaks)?;
+        let ready = self.renderer.ready(item, camera, size, options)?;
         let result = draw(&mut self.desk, &mut self.dealt, self.number, item, &ready, options, progress);
         match result {
             Ok(gathered) => Ok(ready.picture(gathered, options)),
@@ -120,7 +118,7 @@ fn draw<L: Link>(
     dealt: &mut Option<Dealt>,
     number: u32,
     item: &CellItem,
-    ready: &Ready<'_>,
+    ready: &Ready,
     options: &Options,
     progress: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Result<Gathered, CellsError> {
@@ -133,9 +131,6 @@ fn draw<L: Link>(
         size: ready.size,
         lens: ready.lens,
         transfer: (*item.transfer).clone(),
-        planes: ready.breaks.planes.to_vec(),
-        starts: ready.breaks.starts.to_vec(),
-        depths: ready.breaks.depths.to_vec(),
         manner,
         spread: options.spread,
         skip_clear: options.skip_clear,
@@ -174,7 +169,7 @@ impl Dealt {
         &mut self,
         desk: &mut Desk<L>,
         item: &CellItem,
-        ready: &Ready<'_>,
+        ready: &Ready,
         queues: &[Vec<u32>],
     ) -> Result<Counts, LinkError> {
         let (clusters, scalars) = (&*ready.clusters, &*ready.scalars);

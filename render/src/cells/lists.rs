@@ -1,6 +1,6 @@
 //! The lists of a worker: for each pixel the segments that are known, merged runs of cells.
 
-use super::fold::{Segment, Stops, merge, under};
+use super::fold::{Segment, merge, under};
 
 const NONE: u32 = u32::MAX;
 
@@ -36,7 +36,6 @@ impl Lists {
         pixel: usize,
         segment: Segment,
         threshold: f32,
-        stops: &Stops<'_>,
         merged: &mut u64,
     ) -> Option<f64> {
         let [mut list, mut runs] = std::mem::take(&mut self.scratch);
@@ -51,7 +50,7 @@ impl Lists {
         }
         let place = list.partition_point(|s| s.order(&segment).is_lt());
         list.insert(place, segment);
-        merge(&list, stops, |run| runs.push(run));
+        merge(&list, |run| runs.push(run));
         let mut seen = [0.0; 4];
         let mut end = None;
         for (i, run) in runs.iter().enumerate() {

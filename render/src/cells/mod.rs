@@ -60,7 +60,6 @@ pub use engine::Engine;
 pub use fold::Segment;
 pub use group::Group;
 pub use link::{Link, LinkError};
-pub use project::Breaks;
 pub(crate) use split::tetrahedra;
 pub use spread::Spread;
 pub use stats::{Counts, Stats};
@@ -162,9 +161,6 @@ pub enum CellsError {
         "early termination needs a threshold between 0 and 1, and numbers of subscreens and refreshes above 0"
     )]
     Early,
-    /// Depths do not rise, or are not as many as the pixels need.
-    #[error("the depths at which segments are to end do not rise, or do not fit to the picture")]
-    Breaks,
     /// There is no worker, or there are more than [`MAX_WORKERS`].
     #[error("a picture takes 1 to {MAX_WORKERS} workers")]
     Workers,
@@ -205,16 +201,6 @@ impl Segments {
             _ => &[],
         }
     }
-
-    /// What is seen of a pixel between two depths (mm before the eye plane): colour, premultiplied, and opacity. A segment that
-    /// only partly lies between them counts as the same all along; where it must be exact, draw with [`Breaks`] there.
-    pub fn between(&self, x: u32, y: u32, depths: [f64; 2]) -> [f32; 4] {
-        let mut seen = [0.0; 4];
-        for part in self.pixel(x, y).iter().filter_map(|segment| segment.between(depths)) {
-            fold::under(&mut seen, part.rgba);
-        }
-        seen
-    }
 }
 
 /// A grid that was made ready.
@@ -254,11 +240,10 @@ impl CellRenderer {
         camera: &Camera,
         size: [u32; 2],
         options: &Options,
-        breaks: Breaks<'_>,
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> Result<CellPicture, CellsError> {
         let count = options.workers.unwrap_or_else(rayon::current_num_threads);
-        let ready = self.ready(item, camera, size, options, breaks)?;
+        let ready = self.ready(item, camera, size, options)?;
         let (frame, manner) = (ready.frame(), ready.manner(options));
         if count == 0 || count > MAX_WORKERS {
             return Err(CellsError::Workers);
@@ -269,14 +254,13 @@ impl CellRenderer {
     }
 
     /// Checks what is asked for, and makes ready what is not.
-    fn ready<'a>(
+    fn ready(
         &mut self,
         item: &CellItem,
         camera: &Camera,
         size: [u32; 2],
         options: &Options,
-        breaks: Breaks<'a>,
-    ) -> Result<Ready<'a>, CellsError> {
+    ) -> Result<Ready, CellsError> {
         let begin = Instant::now();
         let [width, height] = size;
         let pixels = u64::from(width) * u64::from(height);
@@ -290,9 +274,6 @@ impl CellRenderer {
         }) {
             return Err(CellsError::Early);
         }
-        if !breaks.fit(pixels as usize) {
-            return Err(CellsError::Breaks);
-        }
         let view = View::new(camera, size)?;
         let prepared = self.prepare(std::slice::from_ref(item))?;
         let Some((clusters, scalars)) = prepared.into_iter().next() else { return Err(CellsError::Workers) };
@@ -304,7 +285,6 @@ impl CellRenderer {
             table: Table::new(&item.transfer),
             lens: Lens::new(&view, &item.pose),
             size,
-            breaks,
             skip_clear: options.skip_clear,
             wide: options.wide && has_wide(),
             prepare_ms,
@@ -347,20 +327,19 @@ impl CellRenderer {
 }
 
 /// What a picture is drawn from.
-struct Ready<'a> {
+struct Ready {
     clusters: Arc<Clusters>,
     scalars: Arc<Scalars>,
     table: Table,
     lens: Lens,
     size: [u32; 2],
-    breaks: Breaks<'a>,
     skip_clear: bool,
     wide: bool,
     prepare_ms: f64,
     begin: Instant,
 }
 
-impl Ready<'_> {
+impl Ready {
     fn frame(&self) -> Frame<'_> {
         Frame {
             clusters: &self.clusters,
@@ -368,7 +347,6 @@ impl Ready<'_> {
             table: &self.table,
             lens: self.lens,
             size: self.size,
-            breaks: self.breaks,
             skip_clear: self.skip_clear,
             wide: self.wide,
         }

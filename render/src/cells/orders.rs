@@ -35,10 +35,6 @@ pub(super) struct Drawing {
     pub(super) size: [u32; 2],
     pub(super) lens: Lens,
     pub(super) transfer: Transfer,
-    /// As in `Breaks`.
-    pub(super) planes: Vec<f64>,
-    pub(super) starts: Vec<u32>,
-    pub(super) depths: Vec<f64>,
     pub(super) manner: Manner,
     pub(super) spread: Spread,
     pub(super) skip_clear: bool,
@@ -110,16 +106,12 @@ impl Drawing {
         let out = out.long(side as u64).flag(share).flag(balance).flag(keep);
         let out = out.flag(self.spread == Spread::Blocks).flag(self.skip_clear).flag(self.wide);
         let out = out.flag(early.is_some());
-        let out = match early {
+        match early {
             Some(Early { threshold, subscreens, refreshes }) => {
                 out.real(threshold).word(subscreens.unwrap_or(0)).word(refreshes)
             }
             None => out,
-        };
-        let out = out.word(self.planes.len() as u32).word(self.starts.len() as u32);
-        let out = self.planes.iter().fold(out, |out, &v| out.real(v));
-        let out = self.starts.iter().fold(out, |out, &v| out.word(v));
-        self.depths.iter().fold(out, |out, &v| out.real(v))
+        }
     }
 
     fn read(rest: &mut Reader<'_>) -> Option<Self> {
@@ -145,15 +137,12 @@ impl Drawing {
         } else {
             None
         };
-        let [planes, starts] = [rest.word()?, rest.word()?];
+        rest.0.is_empty().then_some(())?;
         Some(Self {
             number,
             size: [width, height],
             lens: Lens::from_list(list),
             transfer: Transfer::new(points, unit_mm).ok()?,
-            planes: rest.some(planes, 8, Reader::real)?,
-            starts: rest.some(starts, 4, Reader::word)?,
-            depths: rest.all(8, Reader::real)?,
             manner: Manner { early, side, share, balance, keep },
             spread,
             skip_clear,
@@ -182,9 +171,6 @@ mod tests {
             size: [64, 48],
             lens: Lens::from_list(std::array::from_fn(|i| (i / 13) as f64)),
             transfer: Transfer::new(vec![point(0.0), point(2.5)], 0.5).expect("a function"),
-            planes: vec![1.0, 2.0],
-            starts: vec![0, 1, 1],
-            depths: vec![1.5],
             manner: Manner { early, side: 7, share: true, balance: false, keep: true },
             spread: Spread::Blocks,
             skip_clear: true,

@@ -2,7 +2,7 @@
 
 use super::clusters::{Clusters, Scalars};
 use super::early;
-use super::fold::{Segment, Stops, add_up, integrate, length, merge, overlap, sort, under};
+use super::fold::{Segment, add_up, integrate, length, merge, overlap, sort, under};
 use super::lens::Lens;
 use super::scan::{Corner, Raw, Raws, Rect, scan};
 use super::stats::Counts;
@@ -12,43 +12,6 @@ use crate::volume::cells::Place;
 /// Pixels that a cluster is drawn in at once, across and down: what it makes there has to be remembered.
 const TILE: i32 = 128;
 
-/// Depths at which segments end, so that other things can be put between them.
-///
-/// A volume or surface that lies among the cells is merged exactly where segments end at it: name the depths of the
-/// surface's crossings for each pixel, or of the planes of a stack of slabs.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Breaks<'a> {
-    /// Depths for all pixels, mm before the eye plane, rising.
-    pub planes: &'a [f64],
-    /// For each pixel, row by row from the top, where its own depths begin in `depths`, and at the end how many there are;
-    /// empty where no pixel has any.
-    pub starts: &'a [u32],
-    /// The pixels' own depths, rising within each.
-    pub depths: &'a [f64],
-}
-
-impl<'a> Breaks<'a> {
-    /// Whether the lists fit to a picture.
-    pub(super) fn fit(&self, pixels: usize) -> bool {
-        let rising = |list: &[f64]| list.windows(2).all(|w| w[0] <= w[1]) && !list.iter().any(|d| d.is_nan());
-        let own =
-            self.starts.windows(2).all(|w| self.depths.get(w[0] as usize..w[1] as usize).is_some_and(rising));
-        rising(self.planes) && own && (self.starts.is_empty() || self.starts.len() == pixels + 1)
-    }
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.planes.is_empty() && self.starts.is_empty()
-    }
-
-    pub(super) fn pixel(&self, pixel: usize) -> Stops<'a> {
-        let own = match self.starts.get(pixel..pixel + 2) {
-            Some(&[from, to]) => &self.depths[from as usize..to as usize],
-            _ => &[],
-        };
-        Stops { common: self.planes, own }
-    }
-}
-
 /// What is drawn, for all workers.
 #[derive(Debug)]
 pub(super) struct Frame<'a> {
@@ -57,7 +20,6 @@ pub(super) struct Frame<'a> {
     pub(super) table: &'a Table,
     pub(super) lens: Lens,
     pub(super) size: [u32; 2],
-    pub(super) breaks: Breaks<'a>,
     /// Whether what the transfer function makes clear is left out.
     pub(super) skip_clear: bool,
     pub(super) wide: bool,
@@ -392,10 +354,6 @@ impl Projector {
         counts: &mut Counts,
         done: &mut impl FnMut(usize, Segment),
     ) {
-        if !frame.breaks.is_empty() {
-            self.one_by_one(frame, cluster, tile, None, counts, done);
-            return;
-        }
         let none = Segment { front: -1.0, back: -1.0, rgba: [0.0; 4] };
         self.open.clear();
         for y in tile.low[1]..tile.high[1] {
@@ -450,13 +408,13 @@ impl Projector {
                 if overlap(&self.spans) {
                     (open.aside, mixed) = (MIXED, true);
                 } else {
-                    merge(&self.spans, &Stops::default(), done);
+                    merge(&self.spans, done);
                 }
             }
         }
         if mixed {
             let open = std::mem::take(&mut self.open);
-            self.one_by_one(frame, cluster, tile, Some(&open), counts, done);
+            self.one_by_one(frame, cluster, tile, &open, counts, done);
             self.open = open;
         }
     }
@@ -487,24 +445,21 @@ impl Projector {
         }
     }
 
-    /// The same with all stretches of a pixel put in order before they are integrated; of the mixed pixels of `only`, if given.
+    /// The same for the mixed pixels, with all their stretches put in order before they are integrated.
     #[inline(never)]
     fn one_by_one(
         &mut self,
         frame: &Frame<'_>,
         cluster: usize,
         tile: &Rect,
-        only: Option<&[Open]>,
+        open: &[Open],
         counts: &mut Counts,
         done: &mut impl FnMut(usize, Segment),
     ) {
         self.counts.clear();
         self.counts.resize(tile.area(), 0);
         self.raws.clear();
-        self.collect(frame, cluster, tile, only);
-        if only.is_none() {
-            counts.segments += self.raws.len() as u64;
-        }
+        self.collect(frame, cluster, tile, Some(open));
         if self.raws.is_empty() {
             return;
         }
@@ -522,14 +477,13 @@ impl Projector {
                 let raws = &mut self.ordered[from..to];
                 from = to;
                 sort(raws);
-                let stops = frame.breaks.pixel(pixel);
                 self.spans.clear();
-                integrate(raws, frame.table, frame.lens.stretch([x, y]), &stops, &mut self.spans);
+                integrate(raws, frame.table, frame.lens.stretch([x, y]), &mut self.spans);
                 if overlap(&self.spans) {
                     counts.overlaps += 1;
                     add_up(&mut self.spans);
                 }
-                merge(&self.spans, &stops, |run| {
+                merge(&self.spans, |run| {
                     if run.rgba[3] > 0.0 {
                         counts.runs += 1;
                         done(pixel, run);

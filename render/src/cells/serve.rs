@@ -5,7 +5,7 @@ use super::engine;
 use super::group::Desk;
 use super::link::{Link, LinkError};
 use super::orders::{Drawing, Order};
-use super::project::{Breaks, Frame};
+use super::project::Frame;
 use super::spread::queues;
 use super::table::Table;
 use super::worker::{Start, Worker};
@@ -70,18 +70,14 @@ impl<L: Link> Server<L> {
         scalars: &mut Scalars,
     ) -> Result<(), CellsError> {
         let Drawing { number, size, spread, manner, .. } = *drawing;
-        let Drawing { planes, starts, depths, .. } = drawing;
-        let breaks = Breaks { planes, starts, depths };
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let sound = (1..=MAX_PIXELS).contains(&pixels)
-            && breaks.fit(pixels as usize)
-            && scalars.ranges().len() == clusters.len();
+        let sound = (1..=MAX_PIXELS).contains(&pixels) && scalars.ranges().len() == clusters.len();
         if !sound {
             return Err(LinkError::Message { rank: 0 }.into());
         }
         let me = self.desk.link.rank();
         let table = Table::new(&drawing.transfer);
-        let whole = frame(drawing, breaks, &table, clusters, scalars);
+        let whole = frame(drawing, &table, clusters, scalars);
         let mut queues = queues(&whole, self.desk.link.size(), spread);
         let mut homes = vec![0; clusters.len()];
         for (rank, queue) in (0..).zip(&queues) {
@@ -96,7 +92,7 @@ impl<L: Link> Server<L> {
         }
         let left = queues.iter().map(|queue| queue.len() as u32).collect();
         let start = Start { queue: std::mem::take(&mut queues[me]), left, homes: &homes };
-        let mine_only = frame(drawing, breaks, &table, clusters, scalars);
+        let mine_only = frame(drawing, &table, clusters, scalars);
         let worker = Worker::new(&mine_only, manner, self.desk.letters(number), start);
         let result = engine::run(worker, || true);
         // What was taken over from others.
@@ -106,15 +102,9 @@ impl<L: Link> Server<L> {
 }
 
 /// What is drawn, of what is here.
-fn frame<'a>(
-    drawing: &Drawing,
-    breaks: Breaks<'a>,
-    table: &'a Table,
-    clusters: &'a Clusters,
-    scalars: &'a Scalars,
-) -> Frame<'a> {
+fn frame<'a>(drawing: &Drawing, table: &'a Table, clusters: &'a Clusters, scalars: &'a Scalars) -> Frame<'a> {
     let Drawing { size, lens, skip_clear, wide, .. } = *drawing;
-    Frame { clusters, scalars, table, lens, size, breaks, skip_clear, wide: wide && has_wide() }
+    Frame { clusters, scalars, table, lens, size, skip_clear, wide: wide && has_wide() }
 }
 
 /// Leaves only some clusters here.

@@ -352,8 +352,7 @@ impl<'a, L: Link> Worker<'a, L> {
                 counts.merged += 1;
                 continue;
             }
-            let stops = self.frame.breaks.pixel(pixel);
-            let end = lists.add_early(pixel, run, early.threshold as f32, &stops, &mut counts.merged);
+            let end = lists.add_early(pixel, run, early.threshold as f32, &mut counts.merged);
             if let Some(depth) = end {
                 table.terminate(pixel, depth);
             }
@@ -467,7 +466,7 @@ impl<'a, L: Link> Worker<'a, L> {
                 add_up(&mut list);
             }
             let before = row.segments.len();
-            merge(&list, &self.frame.breaks.pixel(pixel), |run| {
+            merge(&list, |run| {
                 under(color, run.rgba);
                 if self.manner.keep {
                     row.segments.push(run);

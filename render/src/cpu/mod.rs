@@ -42,7 +42,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use crate::cells::{self, Breaks, CellPicture, CellRenderer, CellsError, Early, Group, Link, Spans, Strip};
+use crate::cells::{self, CellPicture, CellRenderer, CellsError, Early, Group, Link, Spans, Strip};
 use crate::image::FloatImage;
 use crate::renderer::{Quality, Stats};
 use crate::scene::{CameraError, CellItem, Scene, TextureFormat, VolumeItem, VolumeMode};
@@ -237,8 +237,7 @@ impl CpuRenderer {
     ) -> Result<(FloatImage, Stats), CpuError> {
         if let Some(grid) = grid_alone(scene) {
             let options = self.of_grids(quality);
-            let breaks = Breaks::default();
-            let drawn = self.cells.render(grid, &scene.camera, size, &options, breaks, progress)?;
+            let drawn = self.cells.render(grid, &scene.camera, size, &options, progress)?;
             if let Some(picture) = picture_of_grid(drawn) {
                 return Ok(picture);
             }
@@ -261,7 +260,7 @@ impl CpuRenderer {
     ) -> Result<(FloatImage, Stats), CpuError> {
         if let Some(grid) = grid_alone(scene) {
             let options = self.of_grids(quality);
-            let drawn = group.render(grid, &scene.camera, size, &options, Breaks::default(), progress)?;
+            let drawn = group.render(grid, &scene.camera, size, &options, progress)?;
             if let Some(picture) = picture_of_grid(drawn) {
                 return Ok(picture);
             }

@@ -142,9 +142,7 @@ fn what_cannot_be_drawn_is_said() {
     let options = Options::default();
     let mut renderer = CellRenderer::new();
     let mut draw = |item: &CellItem, camera: &Camera, size, options: &Options| {
-        renderer
-            .render(item, camera, size, options, Breaks::default(), &|_, _| true)
-            .map(|p| p.stats.tetrahedra)
+        renderer.render(item, camera, size, options, &|_, _| true).map(|p| p.stats.tetrahedra)
     };
     let camera = camera();
     assert_eq!(draw(&item, &camera, SIZE, &options), Ok(48), "as it is");
@@ -198,9 +196,7 @@ fn drawing_stops_when_told_to() {
     for engine in [Engine::Threads, Engine::Simulated] {
         let options = Options { engine, workers: Some(3), ..Options::default() };
         let camera = looks([20.0, -15.0, 15.0], [5.0; 3], Projection::Perspective { fov_rad: 0.6 });
-        let stopped =
-            CellRenderer::new()
-                .render(&item, &camera, SIZE, &options, Breaks::default(), &|done, _| done < 4);
+        let stopped = CellRenderer::new().render(&item, &camera, SIZE, &options, &|done, _| done < 4);
         assert_eq!(stopped, Err(CellsError::Cancelled), "{engine:?}");
     }
 }

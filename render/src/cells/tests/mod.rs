@@ -119,9 +119,7 @@ pub(super) fn looks(eye: [f64; 3], target: [f64; 3], projection: Projection) -> 
 }
 
 pub(super) fn draw(item: &CellItem, camera: &Camera, size: [u32; 2], options: &Options) -> CellPicture {
-    CellRenderer::new()
-        .render(item, camera, size, options, Breaks::default(), &|_, _| true)
-        .expect("a picture")
+    CellRenderer::new().render(item, camera, size, options, &|_, _| true).expect("a picture")
 }
 
 /// Every so many pixels of a picture.

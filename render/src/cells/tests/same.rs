@@ -269,7 +269,7 @@ fn drawn(
     camera: &Camera,
     options: &Options,
 ) -> Result<CellPicture, CellsError> {
-    group.render(item, camera, SIZE, options, Breaks::default(), &|_, _| true)
+    group.render(item, camera, SIZE, options, &|_, _| true)
 }
 
 #[test]
@@ -344,7 +344,7 @@ fn a_picture_can_be_given_up_and_another_drawn() {
             let count = std::sync::atomic::AtomicUsize::new(0);
             let goes_on =
                 |_: usize, _: usize| count.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < round;
-            let result = group.render(&item, &camera, SIZE, &keeping(), Breaks::default(), &goes_on);
+            let result = group.render(&item, &camera, SIZE, &keeping(), &goes_on);
             // The others may have taken so much of the first's work that it was asked less often.
             let stopped = count.into_inner() > round;
             let expected = stopped.then_some(CellsError::Cancelled);

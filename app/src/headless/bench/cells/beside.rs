@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use ::render::cells::{Breaks, CellRenderer, Early, Options};
+use ::render::cells::{CellRenderer, Early, Options};
 use ::render::image::FloatImage;
 use ::render::scene::{Camera, CellItem, Projection};
 use ::render::volume::cells::{CellGrid, Part, Place};
@@ -49,13 +49,12 @@ pub(super) fn run(
 ) -> Result<(), Failure> {
     let unwritten = |e: std::io::Error| Failure::Other(format!("no temporary folder can be made ({e})"));
     let folder = tempfile::tempdir().map_err(unwritten)?;
-    let grid = match data {
-        Some(path) => std::path::absolute(path).map_err(unwritten)?,
-        None => {
-            let path = folder.path().join("made.vtk");
-            write_file(&path, &legacy(&item.grid))?;
-            path
-        }
+    let grid = if let Some(path) = data {
+        std::path::absolute(path).map_err(unwritten)?
+    } else {
+        let path = folder.path().join("made.vtk");
+        write_file(&path, &legacy(&item.grid))?;
+        path
     };
     for (view, _, size) in VIEWS.into_iter().filter(|(_, along, _)| *along) {
         let camera = scenes::camera(&item.grid, true, size);
@@ -112,7 +111,7 @@ fn take_turns(
             let took = match &mut entry.way {
                 Way::Ours(options) => {
                     let begin = Instant::now();
-                    let drawn = renderer.render(item, camera, size, options, Breaks::default(), &|_, _| true);
+                    let drawn = renderer.render(item, camera, size, options, &|_, _| true);
                     let took = begin.elapsed().as_secs_f64() * 1e3;
                     entry.picture = drawn.map_err(|e| Failure::Other(e.to_string()))?.image;
                     took

@@ -3,7 +3,7 @@
 //! Workers have clocks of their own. What the paper shows of lists without partial composition has no counterpart: ours are
 //! always merged.
 
-use ::render::cells::{Breaks, CellPicture, CellRenderer, Counts, Early, Engine, Options, Spread};
+use ::render::cells::{CellPicture, CellRenderer, Counts, Early, Engine, Options, Spread};
 use ::render::scene::{Camera, CellItem, Projection};
 use ::render::volume::Vector;
 use serde_json::json;
@@ -40,7 +40,7 @@ fn draw(
     size: [u32; 2],
     options: &Options,
 ) -> Result<CellPicture, Failure> {
-    let drawn = renderer.render(item, camera, size, options, Breaks::default(), &|_, _| true);
+    let drawn = renderer.render(item, camera, size, options, &|_, _| true);
     drawn.map_err(|e| Failure::Other(e.to_string()))
 }
 

@@ -11,7 +11,7 @@ mod scenes;
 use std::path::Path;
 use std::sync::Arc;
 
-use ::render::cells::{Breaks, CellRenderer, Counts, Early, Engine, Options, Spread};
+use ::render::cells::{CellRenderer, Counts, Early, Engine, Options, Spread};
 use ::render::image::FloatImage;
 use ::render::reference;
 use ::render::scene::{Camera, CellItem, Scene};
@@ -88,7 +88,7 @@ fn levels(
     bench: &mut Bench,
 ) -> Result<(), Failure> {
     let mut draw = |options: &Options| {
-        let drawn = renderer.render(item, camera, size, options, Breaks::default(), &|_, _| true);
+        let drawn = renderer.render(item, camera, size, options, &|_, _| true);
         drawn.map_err(|e| Failure::Other(e.to_string()))
     };
     let truth = known(item, camera, size, COMPARED)?;
