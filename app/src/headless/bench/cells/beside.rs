@@ -47,15 +47,14 @@ pub(super) fn run(
     command: &str,
     bench: &mut Bench,
 ) -> Result<(), Failure> {
-    let unwritten = |e: std::io::Error| Failure::Other(format!("no temporary folder can be made ({e})"));
-    let folder = tempfile::tempdir().map_err(unwritten)?;
-    let grid = match data {
-        Some(path) => std::path::absolute(path).map_err(unwritten)?,
-        None => {
-            let path = folder.path().join("made.vtk");
-            write_file(&path, &legacy(&item.grid))?;
-            path
-        }
+    let fault = |e: std::io::Error| Failure::Other(format!("the peer's files cannot be placed ({e})"));
+    let folder = tempfile::tempdir().map_err(fault)?;
+    let grid = if let Some(path) = data {
+        std::path::absolute(path).map_err(fault)?
+    } else {
+        let path = folder.path().join("made.vtk");
+        write_file(&path, &legacy(&item.grid))?;
+        path
     };
     for (view, _, size) in VIEWS.into_iter().filter(|(_, along, _)| *along) {
         let camera = scenes::camera(&item.grid, true, size);
