@@ -261,10 +261,8 @@ fn pass_all(
             any[1].0[lane] |= passed[1][face].0[lane];
         }
     }
-    let mut hit = [0_u64; LANES];
-    for lane in 0..LANES {
-        hit[lane] = any[0].0[lane] & any[1].0[lane];
-    }
+    let hit: [u64; LANES] =
+        std::array::from_fn(|lane| if lane < lanes { any[0].0[lane] & any[1].0[lane] } else { 0 });
     if hit[0] | hit[1] | hit[2] | hit[3] == 0 {
         return;
     }
@@ -304,7 +302,7 @@ fn pass_all(
         to[lane] = if in_order { values[1].0[lane] } else { values[0].0[lane] } as f32;
     }
     if fronts.iter().any(|&front| front < 0.0) {
-        for lane in (0..lanes).filter(|&lane| hit[lane] != 0) {
+        for lane in (0..LANES).filter(|&lane| hit[lane] != 0) {
             let of = |way: usize| [depths[way].0[lane], values[way].0[lane]];
             raws.add(first + lane as u32, [of(0), of(1)]);
         }
@@ -314,8 +312,8 @@ fn pass_all(
         let values = [from[lane], to[lane]];
         raws.list[raws.count] =
             Raw { front: fronts[lane], back: backs[lane], values, pixel: first + lane as u32 };
-        let counts = (hit[lane] != 0) & (backs[lane] > fronts[lane]) & (lane < lanes);
-        raws.count += usize::from(counts);
+        let counts = if backs[lane] > fronts[lane] { hit[lane] } else { 0 };
+        raws.count += usize::from(counts != 0);
     }
 }
 

@@ -49,8 +49,8 @@ impl Node {
     #[inline(always)]
     fn sum(&self, part: f32, width: f32) -> [f64; 4] {
         let mut sum = self.sum;
-        for c in 0..4 {
-            sum[c] += f64::from(part * (self.from[c] + part * self.half_rise[c]) * width);
+        for (c, sum) in sum.iter_mut().enumerate() {
+            *sum += f64::from(part * (self.from[c] + part * self.half_rise[c]) * width);
         }
         sum
     }
@@ -394,8 +394,8 @@ impl Table {
                 return self.in_parts(from, to, mm);
             }
             let behind = behind(tau, opacity);
-            for c in 0..3 {
-                seen[c] += piece.slope[c] * rise * behind;
+            for (seen, slope) in seen.iter_mut().zip(piece.slope) {
+                *seen += slope * rise * behind;
             }
         }
         seen

@@ -5,10 +5,10 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use ::render::cells::{CellRenderer, Early, Options};
+use ::render::cells::{Breaks, CellItem, CellRenderer, Early, Options, Part};
 use ::render::image::FloatImage;
-use ::render::scene::{Camera, CellItem, Projection};
-use ::render::volume::cells::{CellGrid, Part, Place};
+use ::render::scene::{Camera, Projection};
+use ::render::volume::cells::{CellGrid, Place};
 use serde_json::{Value, json};
 
 use super::super::peer::Peer;
@@ -47,10 +47,10 @@ pub(super) fn run(
     command: &str,
     bench: &mut Bench,
 ) -> Result<(), Failure> {
-    let unwritten = |e: std::io::Error| Failure::Other(format!("no temporary folder can be made ({e})"));
-    let folder = tempfile::tempdir().map_err(unwritten)?;
+    let fault = |e: std::io::Error| Failure::Other(format!("the peer's files cannot be placed ({e})"));
+    let folder = tempfile::tempdir().map_err(fault)?;
     let grid = if let Some(path) = data {
-        std::path::absolute(path).map_err(unwritten)?
+        std::path::absolute(path).map_err(fault)?
     } else {
         let path = folder.path().join("made.vtk");
         write_file(&path, &legacy(&item.grid))?;
@@ -111,7 +111,7 @@ fn take_turns(
             let took = match &mut entry.way {
                 Way::Ours(options) => {
                     let begin = Instant::now();
-                    let drawn = renderer.render(item, camera, size, options, &|_, _| true);
+                    let drawn = renderer.render(item, camera, size, options, Breaks::default(), &|_, _| true);
                     let took = begin.elapsed().as_secs_f64() * 1e3;
                     entry.picture = drawn.map_err(|e| Failure::Other(e.to_string()))?.image;
                     took
