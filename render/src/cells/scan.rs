@@ -11,11 +11,6 @@
 //!
 //! Depth and value on a face are the mean of its corners', weighted by the areas that the ray makes with its edges, added
 //! up in the order of the corners' numbers: cells that share the face get the same bits.
-#![expect(
-    clippy::needless_range_loop,
-    clippy::needless_bitwise_bool,
-    reason = "loops over lanes become instructions of the machine as they are, without branches"
-)]
 
 use std::cmp::Ordering;
 

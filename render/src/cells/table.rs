@@ -8,10 +8,6 @@
 //! A mean says nothing about which colour lies in front. Where that would show, a segment is cut at the control points and
 //! as often as needed in between; each part has its mean, and how much nearer the colour at its begin is than that at its end
 //! follows in closed form for an even extinction and a colour that runs linearly.
-#![expect(
-    clippy::needless_range_loop,
-    reason = "loops over lanes become instructions of the machine as they are"
-)]
 
 use crate::volume::Transfer;
 

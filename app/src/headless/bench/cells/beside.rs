@@ -5,10 +5,10 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use ::render::cells::{Breaks, CellItem, CellRenderer, Early, Options, Part};
+use ::render::cells::{CellRenderer, Early, Options};
 use ::render::image::FloatImage;
-use ::render::scene::{Camera, Projection};
-use ::render::volume::cells::{CellGrid, Place};
+use ::render::scene::{Camera, CellItem, Projection};
+use ::render::volume::cells::{CellGrid, Part, Place};
 use serde_json::{Value, json};
 
 use super::super::peer::Peer;
@@ -111,7 +111,7 @@ fn take_turns(
             let took = match &mut entry.way {
                 Way::Ours(options) => {
                     let begin = Instant::now();
-                    let drawn = renderer.render(item, camera, size, options, Breaks::default(), &|_, _| true);
+                    let drawn = renderer.render(item, camera, size, options, &|_, _| true);
                     let took = begin.elapsed().as_secs_f64() * 1e3;
                     entry.picture = drawn.map_err(|e| Failure::Other(e.to_string()))?.image;
                     took
