@@ -1,8 +1,8 @@
 //! Workers as the processes of an MPI job: `mpirun -n N program`.
 //!
 //! Messages go from point to point over a communicator of their own, so that nothing else that the program does with MPI gets
-//! among them. A message longer than [`PIECE`] goes in pieces, since MPI counts in 32 bits. A process that waits sleeps in
-//! between; what it has sent stays in memory until MPI has passed it on, up to [`OUTGOING`] bytes, and then sending takes
+//! among them. A message longer than `PIECE` goes in pieces, since MPI counts in 32 bits. A process that waits sleeps in
+//! between; what it has sent stays in memory until MPI has passed it on, up to `OUTGOING` bytes, and then sending takes
 //! letters in until there is room again.
 //!
 //! A fault inside MPI ends the whole job, which is how MPI comes: with its message and an exit code above 0. So does a process
