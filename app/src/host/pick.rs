@@ -74,11 +74,11 @@ fn grids_depth(scene: &Scene, ray: &Ray, start: f64, step_mm: f64) -> Vec<f64> {
             let [from, to] = span.reach;
             let first = ((from - start) / step_mm).max(0.0) as usize;
             let end = (((to - start) / step_mm).ceil().max(0.0) as usize).min(STEPS);
-            for step in first..end {
+            for (step, depth) in depth.iter_mut().enumerate().take(end).skip(first) {
                 let begin = start + step as f64 * step_mm;
                 let (a, b) = (from.max(begin), to.min(begin + step_mm));
                 let (_, extinction) = item.transfer.classify(span.value(0.5 * (a + b)));
-                depth[step] += extinction * (b - a).max(0.0);
+                *depth += extinction * (b - a).max(0.0);
             }
         }
     }
