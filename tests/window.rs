@@ -72,3 +72,24 @@ fn a_window_whose_device_is_lost_opens_again_and_draws_the_same_case() {
     assert!(said.contains("stopped answering") && !said.contains("panicked"), "{said}");
     assert!(orange(&picture) > 2000, "the case is drawn again: {} pixels", orange(&picture));
 }
+
+#[test]
+fn the_window_shows_a_grid_in_3d_and_in_sections_with_its_colour_bar() {
+    if !gpu_wanted() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let grid = folder.path().join("load.vtk");
+    // A wedge of 40 mm whose scalar rises from one end to the other.
+    let text = "# vtk DataFile Version 3.0\nmade\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 6 double\n\
+                0 0 0 40 0 0 0 40 0 0 0 40 40 0 40 0 40 40\nCELLS 1 7\n6 0 2 1 3 5 4\nCELL_TYPES 1\n13\n\
+                POINT_DATA 6\nSCALARS load double 1\nLOOKUP_TABLE default\n0 0 0 5 5 5\n";
+    std::fs::write(&grid, text).unwrap();
+    let (picture, _) = screenshot_of(&[grid.to_str().unwrap()], folder.path(), &[]);
+    let near = |p: &image::Rgb<u8>, to: [u8; 3]| (0..3).all(|c| p.0[c].abs_diff(to[c]) < 12);
+    let count = |to: [u8; 3]| picture.pixels().filter(|p| near(p, to)).count();
+    // The ends of the default colours: at least in two sections, and at the ends of the bar.
+    let (low, high) = (count([59, 76, 192]), count([180, 4, 38]));
+    assert!(low > 500 && high > 500, "both ends of the colours are on screen: {low}, {high}");
+    assert!(colours(&picture) > 300, "and what is between: {}", colours(&picture));
+}

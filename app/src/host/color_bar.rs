@@ -37,6 +37,9 @@ pub(super) fn bars_ui(painter: &Painter, rect: Rect, grids: &[ShownGrid]) {
 fn bar_ui(painter: &Painter, bar: Rect, grid: &ShownGrid) {
     let transfer = &grid.item.transfer;
     let [low, high] = ends(transfer);
+    if !(high - low).is_finite() {
+        return;
+    }
     painter.add(Shape::mesh(ramp(transfer, [low, high], bar)));
     painter.rect_stroke(bar, 0.0, Stroke::new(1.0, Color32::from_gray(200)), egui::StrokeKind::Outside);
     let font = FontId::proportional(11.5);

@@ -322,7 +322,11 @@ fn act(
     } else if wheel != 0.0 {
         // Half a voxel a notch's quarter: slices pass one by one, and a swipe goes far.
         let normal = views.normal(orientation);
-        let step_mm = slice_step_mm(input.layers, &normal);
+        let step_mm = match input.layers {
+            // A grid has no slices, and may be of any size.
+            [] if !input.grids.is_empty() => input.ball.radius_mm / 100.0,
+            layers => slice_step_mm(layers, &normal),
+        };
         let crosshair = views.crosshair.unwrap_or(input.ball.centre);
         views.crosshair = Some(crosshair + normal * (f64::from(wheel) / WHEEL_POINTS * step_mm));
     }

@@ -164,7 +164,7 @@ impl Session {
         let faults: BTreeSet<String> = visible.filter_map(|g| scene::grid_fault(g, &self.assets)).collect();
         for fault in &faults {
             if !self.told.contains(fault) {
-                self.complain(sentence(fault));
+                self.complain(fault.as_str());
             }
         }
         self.told = faults;
@@ -242,6 +242,7 @@ impl Session {
         self.path = Some(path);
         self.saved_labels.clear();
         self.failed.clear();
+        self.told.clear();
         self.replaced += 1;
     }
 

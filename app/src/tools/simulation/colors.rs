@@ -61,7 +61,9 @@ pub(super) fn with_unit(transfer: &Transfer, unit_mm: f64) -> Option<Transfer> {
 
 /// Other colours between the same values and opacities.
 pub(super) fn with_map(transfer: &Transfer, map: &Colormap) -> Transfer {
-    map.transfer(range(transfer), opacity(transfer), transfer.unit_mm())
+    let made = map.transfer(range(transfer), opacity(transfer), transfer.unit_mm());
+    // The very ends, which a sum of parts may miss.
+    with_range(&made, range(transfer)).unwrap_or(made)
 }
 
 #[cfg(test)]
