@@ -4,7 +4,6 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use super::CellsError;
 use super::link::{Link, LinkError, Post};
-use super::lists::Spare;
 use super::project::Frame;
 use super::worker::{Gathered, Manner, Start, Step, Worker};
 
@@ -22,8 +21,6 @@ pub enum Engine {
 /// Clusters of each worker, and what is told of progress.
 pub(super) struct Jobs<'a> {
     pub(super) queues: Vec<Vec<u32>>,
-    /// Lists of workers of earlier pictures.
-    pub(super) spare: &'a Spare,
     pub(super) progress: &'a (dyn Fn(usize, usize) -> bool + Sync),
 }
 
@@ -56,7 +53,7 @@ impl Engine {
         let workers = jobs.queues.into_iter().enumerate();
         let mut workers: Vec<_> = workers
             .map(|(rank, queue)| {
-                let start = Start { queue, left: left.clone(), homes: &[], spare: jobs.spare };
+                let start = Start { queue, left: left.clone(), homes: &[] };
                 Worker::new(frame, manner, post.link(rank), start)
             })
             .collect();

@@ -142,8 +142,7 @@ fn draw<L: Link>(
     }
     let left: Vec<u32> = queues.iter().map(|queue| queue.len() as u32).collect();
     let total = frame.clusters.len();
-    let start =
-        Start { queue: std::mem::take(&mut queues[0]), left, homes: &dealt.homes, spare: &ready.spare };
+    let start = Start { queue: std::mem::take(&mut queues[0]), left, homes: &dealt.homes };
     let mut worker = Worker::new(&frame, manner, desk.letters(number), start);
     loop {
         match worker.step()? {

@@ -1,13 +1,8 @@
 //! The lists of a worker: for each pixel the segments that are known, merged runs of cells.
 
-use std::sync::{Mutex, PoisonError};
-
 use super::fold::{Segment, merge, under};
-use super::project::Projector;
 
 const NONE: u32 = u32::MAX;
-/// Segments that are kept room for in any case.
-const MANY: usize = 1 << 16;
 
 #[derive(Debug, Clone, Copy)]
 struct Node {
@@ -16,38 +11,18 @@ struct Node {
 }
 
 /// A list of segments for each pixel of a picture.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Lists {
     heads: Vec<u32>,
     nodes: Vec<Node>,
     scratch: [Vec<Segment>; 2],
 }
 
-/// Lists of workers that are done, and what they projected with: memory that the next picture's need not ask for.
-#[derive(Debug, Default)]
-pub(super) struct Spare(Mutex<Vec<(Lists, Projector)>>);
-
-impl Spare {
-    /// Empty lists for a picture.
-    pub(super) fn take(&self, pixels: usize) -> (Lists, Projector) {
-        // A panic elsewhere leaves the list whole.
-        let spare = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let (mut lists, projector) = spare.unwrap_or_default();
-        lists.heads.clear();
-        lists.heads.resize(pixels, NONE);
-        lists.nodes.clear();
-        (lists, projector)
-    }
-
-    /// Keeps what a worker has no more use for, but not what takes much more memory than it needed.
-    pub(super) fn give(&self, lists: Lists, projector: Projector) {
-        if lists.nodes.capacity() <= 4 * lists.nodes.len() + MANY {
-            self.0.lock().unwrap_or_else(PoisonError::into_inner).push((lists, projector));
-        }
-    }
-}
-
 impl Lists {
+    pub(super) fn new(pixels: usize) -> Self {
+        Self { heads: vec![NONE; pixels], nodes: Vec::new(), scratch: Default::default() }
+    }
+
     /// Adds a segment in no order.
     pub(super) fn add(&mut self, pixel: usize, segment: Segment) {
         self.nodes.push(Node { segment, next: self.heads[pixel] });

@@ -77,7 +77,6 @@ use crate::volume::cells::{CellGrid, Scalar};
 use clusters::{Clusters, Scalars};
 use engine::Jobs;
 use lens::Lens;
-use lists::Spare;
 use project::Frame;
 use spread::queues;
 use table::Table;
@@ -220,7 +219,6 @@ type Prepared = (Arc<Clusters>, Arc<Scalars>);
 #[derive(Debug, Default)]
 pub struct CellRenderer {
     kept: Vec<Kept>,
-    spare: Arc<Spare>,
 }
 
 impl CellRenderer {
@@ -250,7 +248,7 @@ impl CellRenderer {
         if count == 0 || count > MAX_WORKERS {
             return Err(CellsError::Workers);
         }
-        let jobs = Jobs { queues: queues(&frame, count, options.spread), spare: &ready.spare, progress };
+        let jobs = Jobs { queues: queues(&frame, count, options.spread), progress };
         let gathered = options.engine.run(&frame, manner, jobs)?;
         Ok(ready.picture(gathered, options))
     }
@@ -289,7 +287,6 @@ impl CellRenderer {
             size,
             skip_clear: options.skip_clear,
             wide: options.wide && has_wide(),
-            spare: Arc::clone(&self.spare),
             prepare_ms,
             begin,
         })
@@ -338,7 +335,6 @@ struct Ready {
     size: [u32; 2],
     skip_clear: bool,
     wide: bool,
-    spare: Arc<Spare>,
     prepare_ms: f64,
     begin: Instant,
 }

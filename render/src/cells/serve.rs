@@ -4,7 +4,6 @@ use super::clusters::{Clusters, Scalars};
 use super::engine;
 use super::group::Desk;
 use super::link::{Link, LinkError};
-use super::lists::Spare;
 use super::orders::{Drawing, Order};
 use super::project::Frame;
 use super::spread::queues;
@@ -16,8 +15,7 @@ use crate::volume::cells::Place;
 
 /// Draws its part of every picture, until the first process has no more to draw. Where that fails, the first is told.
 pub(super) fn serve<L: Link>(desk: Desk<L>) -> Result<(), CellsError> {
-    let mut server =
-        Server { desk, spare: Spare::default(), fault: Some("its program broke down".to_owned()) };
+    let mut server = Server { desk, fault: Some("its program broke down".to_owned()) };
     let result = server.run();
     server.fault = result.as_ref().err().map(ToString::to_string);
     result
@@ -26,8 +24,6 @@ pub(super) fn serve<L: Link>(desk: Desk<L>) -> Result<(), CellsError> {
 /// A process at work.
 struct Server<L: Link> {
     desk: Desk<L>,
-    /// Lists of earlier pictures.
-    spare: Spare,
     /// What the first is told where this ends now.
     fault: Option<String>,
 }
@@ -95,7 +91,7 @@ impl<L: Link> Server<L> {
             return Err(LinkError::Message { rank: 0 }.into());
         }
         let left = queues.iter().map(|queue| queue.len() as u32).collect();
-        let start = Start { queue: std::mem::take(&mut queues[me]), left, homes: &homes, spare: &self.spare };
+        let start = Start { queue: std::mem::take(&mut queues[me]), left, homes: &homes };
         let mine_only = frame(drawing, &table, clusters, scalars);
         let worker = Worker::new(&mine_only, manner, self.desk.letters(number), start);
         let result = engine::run(worker, || true);

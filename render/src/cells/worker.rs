@@ -15,7 +15,7 @@ use super::clusters::Pack;
 use super::early::{self, Early};
 use super::fold::{Segment, add_up, merge, overlap, under};
 use super::link::{Link, LinkError};
-use super::lists::{Lists, Spare};
+use super::lists::Lists;
 use super::project::{Frame, Projector};
 use super::stats::Counts;
 use super::wire::Message;
@@ -40,8 +40,6 @@ pub(super) struct Start<'a> {
     pub(super) left: Vec<u32>,
     /// The worker that has each cluster's cells and values, beside the first, which has all; empty where all share them.
     pub(super) homes: &'a [u32],
-    /// Lists of workers that are done.
-    pub(super) spare: &'a Spare,
 }
 
 /// What a step came to.
@@ -90,7 +88,6 @@ pub(super) struct Worker<'a, L> {
     /// Clusters to do, the next one last.
     queue: Vec<u32>,
     lists: Lists,
-    spare: &'a Spare,
     table: Option<early::Table>,
     projector: Projector,
     phase: Phase,
@@ -110,11 +107,10 @@ pub(super) struct Worker<'a, L> {
 
 impl<'a, L: Link> Worker<'a, L> {
     pub(super) fn new(frame: &'a Frame<'a>, manner: Manner, link: L, start: Start<'a>) -> Self {
-        let Start { mut queue, left, homes, spare } = start;
+        let Start { mut queue, left, homes } = start;
         let [width, height] = frame.size.map(|n| n as usize);
         let workers = link.size();
         queue.reverse();
-        let (lists, projector) = spare.take(width * height);
         let rows = if link.rank() == 0 { vec![Row::default(); height] } else { Vec::new() };
         Self {
             frame,
@@ -122,10 +118,9 @@ impl<'a, L: Link> Worker<'a, L> {
             homes,
             told: queue.len() as u32,
             queue,
-            lists,
-            spare,
+            lists: Lists::new(width * height),
             table: manner.early.map(|_| early::Table::new(frame.size, manner.side)),
-            projector,
+            projector: Projector::default(),
             phase: Phase::Cells,
             since: 0,
             left,
@@ -428,7 +423,6 @@ impl<'a, L: Link> Worker<'a, L> {
                 self.send(0, &Message::Row(y, row.colors, row.counts, row.segments))?;
             }
         }
-        self.spare.give(std::mem::take(&mut self.lists), std::mem::take(&mut self.projector));
         self.phase = Phase::Gathering;
         if me > 0 {
             self.finish_counts()?;
