@@ -5,7 +5,6 @@
 
 use std::sync::Arc;
 
-pub use render::cells::Faults as CellFaults;
 use render::scene::{Camera, CellItem, Labels, MeshItem, Piece, Projection, Scene, VolumeItem};
 use render::volume::cells::{Scalar, Step};
 use render::volume::{Affine, CellGrid, Point, Transfer, Vector};

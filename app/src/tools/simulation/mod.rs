@@ -16,7 +16,7 @@ use crate::case::UnstructuredGrid;
 use crate::host::context::ToolContext;
 use crate::host::overlay::Overlay;
 use crate::host::tool::{Tool, ToolId};
-use crate::scene::{self, CellFaults};
+use crate::scene;
 use crate::sections::ShownGrid;
 use crate::steps::clock::Clock;
 use crate::ui::pose::PoseEditor;
@@ -28,8 +28,6 @@ use extremes::Extremes;
 pub struct Simulation {
     pose: PoseEditor,
     clock: Clock,
-    /// The cells whose faults were counted.
-    checked: Option<(Weak<CellGrid>, CellFaults)>,
     known: Option<Known>,
 }
 
@@ -90,12 +88,6 @@ impl Simulation {
             extremes: Extremes::of(cells, step, scalar),
             probed: None,
         }))
-    }
-
-    /// How many cells of a grid are at fault.
-    fn faults(&mut self, cells: &Arc<CellGrid>) -> CellFaults {
-        let known = self.checked.take().filter(|(of, _)| of.as_ptr() == Arc::as_ptr(cells));
-        self.checked.insert(known.unwrap_or_else(|| (Arc::downgrade(cells), CellFaults::of(cells)))).1
     }
 
     /// The scalar of the chosen grid at a world place.

@@ -1,7 +1,5 @@
 //! The panel of simulations.
 
-use std::sync::Arc;
-
 use egui::{Button, ComboBox, RichText, Ui};
 use render::volume::cells::CellKind;
 use render::volume::{Affine, CellGrid, Point};
@@ -88,7 +86,7 @@ fn chosen_ui(tool: &mut Simulation, ctx: &mut ToolContext<'_>, ui: &mut Ui, grid
     }
     place_ui(tool, ctx, ui, grid, cells);
     ui.separator();
-    cells_ui(tool, ctx, ui, grid, cells);
+    cells_ui(ctx, ui, grid, cells);
 }
 
 /// Where the scalar is least and greatest, and what it is at the crosshair.
@@ -178,26 +176,11 @@ fn place_ui(
     }
 }
 
-/// How many points and cells there are, and what is wrong with them.
-fn cells_ui(
-    tool: &mut Simulation,
-    ctx: &ToolContext<'_>,
-    ui: &mut Ui,
-    grid: &UnstructuredGrid,
-    cells: &Arc<CellGrid>,
-) {
+/// How many points and cells there are, and what the loader says of them.
+fn cells_ui(ctx: &ToolContext<'_>, ui: &mut Ui, grid: &UnstructuredGrid, cells: &CellGrid) {
     let kinds = CellKind::ALL.into_iter().filter(|&kind| cells.count(kind) > 0);
     let kinds: Vec<String> = kinds.map(|kind| format!("{} {}", cells.count(kind), kind.name())).collect();
     theme::quiet_ui(ui, format!("{} points; cells: {}", cells.points().len(), kinds.join(", ")));
-    let faults = tool.faults(cells);
-    for (count, words) in [
-        (faults.flat, "parts of cells have no volume and are left out"),
-        (faults.inverted, "cells have a part that is turned inside out; they are drawn as any other"),
-    ] {
-        if count > 0 {
-            ui.label(RichText::new(format!("{count} {words}")).small().color(theme::CAUTION));
-        }
-    }
     if let Some(asset) = ctx.assets.asset(&Key::of_grid(grid)) {
         theme::quiet_ui(ui, asset.format);
         notes_ui(ui, &asset.notes);
