@@ -90,6 +90,7 @@ impl<L: Link> Group<L> {
         match result {
             Ok(gathered) => Ok(ready.picture(gathered, options)),
             Err(error) => {
+                let error = self.desk.why(error);
                 self.desk.tell_all(&Order::Stop);
                 if let CellsError::Link(lost) = &error {
                     self.lost = Some(lost.clone());
@@ -253,6 +254,20 @@ impl<L: Link> Desk<L> {
             // Who is gone needs to be told nothing.
             drop(self.order(to, order.to_bytes()));
         }
+    }
+
+    /// What another has said of why it ends, where that is not known from the error itself: it may have gone before its
+    /// letter was read.
+    fn why(&mut self, error: CellsError) -> CellsError {
+        if !matches!(error, CellsError::Link(LinkError::Lost { .. })) {
+            return error;
+        }
+        while let Ok(Some(Letter { from, number, message })) = self.collect() {
+            if let (0, Some(Order::Failed(fault))) = (number, Order::from_bytes(&message)) {
+                return LinkError::Failed { rank: from, fault }.into();
+            }
+        }
+        error
     }
 
     /// Waits for the first worker's next order.
