@@ -15,6 +15,7 @@ mod apply;
 mod fragments;
 
 pub use apply::apply;
+pub(super) use apply::{fragment_mut, new_id, positive, rigid};
 
 /// A change to a case. `id` names the thing changed.
 #[derive(Debug, Clone, PartialEq)]

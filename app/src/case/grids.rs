@@ -5,7 +5,11 @@ use std::sync::Arc;
 use render::volume::cells::{Part, Place, Scalar};
 use render::volume::{Affine, CellGrid, Transfer};
 
+use super::edit::{fragment_mut, new_id, positive, rigid};
 use super::{Case, EditError, Other, Source};
+
+/// What is out of its range, if it is.
+const SCALE: &str = "a grid's scale";
 
 /// A grid of finite elements or of flow, placed in the case.
 #[derive(Debug, Clone, PartialEq)]
@@ -131,20 +135,17 @@ pub(super) fn apply(case: &mut Case, id: &str, change: GridChange) -> Result<(),
             case.grids.remove(index);
         }
         GridChange::Rename(to) => {
-            if to.is_empty() {
-                return Err(EditError::Nameless { kind: "grid" });
-            }
-            if id != to && case.grid(&to).is_some() {
-                return Err(EditError::Taken { kind: "grid", id: to });
-            }
+            new_id("grid", &to, id != to && case.grid(&to).is_some())?;
             case.grids[index].id = to;
         }
         GridChange::Fragment(fragment) => {
-            check_fragment(case, fragment.as_deref())?;
+            if let Some(fragment) = &fragment {
+                fragment_mut(case, fragment)?;
+            }
             case.grids[index].fragment = fragment;
         }
-        GridChange::Pose(pose) => case.grids[index].pose = check_pose(id, *pose)?,
-        GridChange::Scale(scale) => case.grids[index].scale = check_scale(scale)?,
+        GridChange::Pose(pose) => case.grids[index].pose = rigid(id, *pose)?,
+        GridChange::Scale(scale) => case.grids[index].scale = positive(scale, SCALE)?,
         GridChange::Visible(visible) => case.grids[index].visible = visible,
         GridChange::Field(field) => {
             let grid = &mut case.grids[index];
@@ -163,15 +164,12 @@ pub(super) fn apply(case: &mut Case, id: &str, change: GridChange) -> Result<(),
 
 /// Adds a grid at the end of the list, or leaves all as it was.
 pub(super) fn add(case: &mut Case, grid: UnstructuredGrid) -> Result<(), EditError> {
-    if grid.id.is_empty() {
-        return Err(EditError::Nameless { kind: "grid" });
+    new_id("grid", &grid.id, case.grid(&grid.id).is_some())?;
+    if let Some(fragment) = &grid.fragment {
+        fragment_mut(case, fragment)?;
     }
-    if case.grid(&grid.id).is_some() {
-        return Err(EditError::Taken { kind: "grid", id: grid.id });
-    }
-    check_fragment(case, grid.fragment.as_deref())?;
-    check_pose(&grid.id, grid.pose)?;
-    check_scale(grid.scale)?;
+    rigid(&grid.id, grid.pose)?;
+    positive(grid.scale, SCALE)?;
     case.grids.push(grid);
     Ok(())
 }
@@ -188,24 +186,5 @@ pub(super) fn let_go(case: &mut Case) {
 pub(super) fn follow(case: &mut Case, from: &str, to: &str) {
     for grid in case.grids.iter_mut().filter(|g| g.fragment.as_deref() == Some(from)) {
         grid.fragment = Some(to.to_owned());
-    }
-}
-
-fn check_fragment(case: &Case, fragment: Option<&str>) -> Result<(), EditError> {
-    match fragment.filter(|id| case.fragment(id).is_none()) {
-        Some(id) => Err(EditError::Missing { kind: "fragment", id: id.to_owned() }),
-        None => Ok(()),
-    }
-}
-
-fn check_pose(id: &str, pose: Affine) -> Result<Affine, EditError> {
-    pose.require_rigid().map_err(|source| EditError::Pose { id: id.to_owned(), source })
-}
-
-fn check_scale(scale: f64) -> Result<f64, EditError> {
-    if scale > 0.0 && scale.is_finite() {
-        Ok(scale)
-    } else {
-        Err(EditError::Range { what: "a grid's scale", range: "positive and finite", value: scale })
     }
 }

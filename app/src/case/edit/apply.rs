@@ -164,7 +164,7 @@ fn apply_to_implants(case: &mut Case, edit: Edit) -> Result<(), EditError> {
         Edit::AddImplant(implant) => {
             new_id("implant", &implant.id, case.implant(&implant.id).is_some())?;
             rigid(&implant.id, implant.pose)?;
-            positive(implant.scale)?;
+            positive(implant.scale, "an implant's scale")?;
             for cutter in implant.keep.keys() {
                 cutter_mut(case, cutter)?;
             }
@@ -181,7 +181,9 @@ fn apply_to_implants(case: &mut Case, edit: Edit) -> Result<(), EditError> {
             implant_mut(case, &id)?.id = to;
         }
         Edit::SetImplantPose { id, pose } => implant_mut(case, &id)?.pose = rigid(&id, pose)?,
-        Edit::SetImplantScale { id, scale } => implant_mut(case, &id)?.scale = positive(scale)?,
+        Edit::SetImplantScale { id, scale } => {
+            implant_mut(case, &id)?.scale = positive(scale, "an implant's scale")?;
+        }
         Edit::SetImplantKeep { id, keep } => {
             for cutter in keep.keys() {
                 cutter_mut(case, cutter)?;
@@ -212,7 +214,7 @@ pub(super) fn cutter_mut<'a>(case: &'a mut Case, id: &str) -> Result<&'a mut Nam
     case.cutters.iter_mut().find(|c| c.id == id).ok_or_else(missing)
 }
 
-pub(super) fn fragment_mut<'a>(case: &'a mut Case, id: &str) -> Result<&'a mut Fragment, EditError> {
+pub(in crate::case) fn fragment_mut<'a>(case: &'a mut Case, id: &str) -> Result<&'a mut Fragment, EditError> {
     let missing = || EditError::Missing { kind: "fragment", id: id.to_owned() };
     case.fragments.iter_mut().find(|f| f.id == id).ok_or_else(missing)
 }
@@ -222,22 +224,22 @@ fn implant_mut<'a>(case: &'a mut Case, id: &str) -> Result<&'a mut Implant, Edit
     case.implants.iter_mut().find(|i| i.id == id).ok_or_else(missing)
 }
 
-fn new_id(kind: &'static str, id: &str, taken: bool) -> Result<(), EditError> {
+pub(in crate::case) fn new_id(kind: &'static str, id: &str, taken: bool) -> Result<(), EditError> {
     if id.is_empty() {
         return Err(EditError::Nameless { kind });
     }
     if taken { Err(EditError::Taken { kind, id: id.to_owned() }) } else { Ok(()) }
 }
 
-fn rigid(id: &str, pose: Affine) -> Result<Affine, EditError> {
+pub(in crate::case) fn rigid(id: &str, pose: Affine) -> Result<Affine, EditError> {
     pose.require_rigid().map_err(|source| EditError::Pose { id: id.to_owned(), source })
 }
 
-fn positive(value: f64) -> Result<f64, EditError> {
+pub(in crate::case) fn positive(value: f64, what: &'static str) -> Result<f64, EditError> {
     if value > 0.0 && value.is_finite() {
         Ok(value)
     } else {
-        Err(EditError::Range { what: "an implant's scale", range: "positive and finite", value })
+        Err(EditError::Range { what, range: "positive and finite", value })
     }
 }
 

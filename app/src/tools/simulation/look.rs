@@ -6,18 +6,14 @@ use egui::{Button, ComboBox, DragValue, Slider, TextEdit, Ui};
 use render::volume::cells::{Part, Place, Scalar};
 use render::volume::{CellGrid, Transfer};
 
-use super::{colors, extremes};
+use super::{change, colors, extremes};
+use crate::case::UnstructuredGrid;
 use crate::case::grids::{FieldChoice, GridChange};
-use crate::case::{Edit, UnstructuredGrid};
 use crate::colormaps::COLORMAPS;
 use crate::host::context::ToolContext;
 use crate::scene;
 use crate::sections;
 use crate::ui::theme;
-
-fn change(ctx: &mut ToolContext<'_>, grid: &UnstructuredGrid, change: GridChange) {
-    ctx.edit(Edit::ChangeGrid { id: grid.id.clone(), change });
-}
 
 /// The field, what of it, and its unit.
 pub(super) fn field_ui(

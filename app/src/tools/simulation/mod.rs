@@ -12,7 +12,8 @@ use std::sync::{Arc, Weak};
 use render::volume::cells::Scalar;
 use render::volume::{CellGrid, Point};
 
-use crate::case::UnstructuredGrid;
+use crate::case::grids::GridChange;
+use crate::case::{Edit, UnstructuredGrid};
 use crate::host::context::ToolContext;
 use crate::host::overlay::Overlay;
 use crate::host::tool::{Tool, ToolId};
@@ -29,6 +30,11 @@ pub struct Simulation {
     pose: PoseEditor,
     clock: Clock,
     known: Option<Known>,
+}
+
+/// Makes a change to a grid.
+fn change(ctx: &mut ToolContext<'_>, grid: &UnstructuredGrid, change: GridChange) {
+    ctx.edit(Edit::ChangeGrid { id: grid.id.clone(), change });
 }
 
 /// What takes a walk over all cells to know, kept for as long as the same scalar is shown.

@@ -4,20 +4,16 @@ use egui::{Button, ComboBox, RichText, Ui};
 use render::volume::cells::CellKind;
 use render::volume::{Affine, CellGrid, Point};
 
-use super::{Simulation, look, time};
+use super::{Simulation, change, look, time};
+use crate::case::UnstructuredGrid;
 use crate::case::assets::Key;
 use crate::case::grids::GridChange;
-use crate::case::{Edit, UnstructuredGrid};
 use crate::host::context::{Request, ToolContext};
 use crate::scene;
 use crate::sections::{self, ShownGrid};
 use crate::ui::notes::notes_ui;
 use crate::ui::pose::PoseInput;
 use crate::ui::{name, number, theme, value};
-
-fn change(ctx: &mut ToolContext<'_>, grid: &UnstructuredGrid, change: GridChange) {
-    ctx.edit(Edit::ChangeGrid { id: grid.id.clone(), change });
-}
 
 pub(super) fn show_ui(tool: &mut Simulation, ctx: &mut ToolContext<'_>, ui: &mut Ui) {
     if ui.button("Open a grid…").on_hover_text("VTU, VTK, PVTU, Exodus, PLOT3D").clicked() {

@@ -3,9 +3,9 @@
 use egui::{DragValue, Slider, Ui};
 use render::volume::CellGrid;
 
-use super::Simulation;
+use super::{Simulation, change};
+use crate::case::UnstructuredGrid;
 use crate::case::grids::GridChange;
-use crate::case::{Edit, UnstructuredGrid};
 use crate::host::context::ToolContext;
 use crate::steps::clock::{Due, SPEEDS};
 use crate::ui::number;
@@ -60,6 +60,6 @@ pub(super) fn time_ui(
         ui.ctx().request_repaint();
     }
     if wish != shown {
-        ctx.edit(Edit::ChangeGrid { id: grid.id.clone(), change: GridChange::Step(wish) });
+        change(ctx, grid, GridChange::Step(wish));
     }
 }
