@@ -5,65 +5,32 @@
 //! before the ray is walked, so that a volume between or within cells needs no slices.
 
 use std::ops::Range;
-use std::sync::Arc;
 
-use super::clusters::{Clusters, Scalars};
-use super::lens::Lens;
-use super::project::{Frame, Gathered, Projector};
+use super::project::{Gathered, Projector};
 use super::scan::{Raw, Rect};
 use super::stats::Counts;
 use super::table::{Place, Table};
-use super::{CellsError, Options, Prepared};
+use super::{CellsError, Options, Placed};
 use crate::scene::CellItem;
-use crate::simd::has_wide;
 use crate::view::View;
 
-/// A grid before the camera.
+/// A grid before the camera, with the pixels that each cluster may show in.
 #[derive(Debug)]
-pub(crate) struct Placed {
-    clusters: Arc<Clusters>,
-    scalars: Arc<Scalars>,
-    table: Table,
-    lens: Lens,
-    size: [u32; 2],
-    skip_clear: bool,
-    wide: bool,
-    /// The pixels that each cluster may show in.
+pub(crate) struct Among {
+    placed: Placed,
     reaches: Vec<Rect>,
 }
 
-impl Placed {
-    pub(super) fn new(
-        (clusters, scalars): Prepared,
-        item: &CellItem,
-        view: &View,
-        options: &Options,
-    ) -> Self {
-        let (skip_clear, wide) = (options.skip_clear, options.wide && has_wide());
-        let (table, lens) = (Table::new(&item.transfer), Lens::new(view, &item.pose));
-        let reaches = Vec::new();
-        let mut placed = Self { clusters, scalars, table, lens, size: view.size, skip_clear, wide, reaches };
+impl Among {
+    fn new(placed: Placed) -> Self {
         let frame = placed.frame();
         let reaches = (0..placed.clusters.len()).map(|cluster| frame.reach(cluster).0).collect();
-        placed.reaches = reaches;
-        placed
+        Self { placed, reaches }
     }
 
     /// How many tetrahedra the grid has.
     pub(crate) fn tetrahedra(&self) -> u64 {
-        (0..self.clusters.len()).map(|cluster| self.clusters.count(cluster) as u64).sum()
-    }
-
-    fn frame(&self) -> Frame<'_> {
-        Frame {
-            clusters: &self.clusters,
-            scalars: &self.scalars,
-            table: &self.table,
-            lens: self.lens,
-            size: self.size,
-            skip_clear: self.skip_clear,
-            wide: self.wide,
-        }
+        self.placed.tetrahedra()
     }
 }
 
@@ -82,7 +49,8 @@ pub(crate) struct Strip {
 
 impl Strip {
     /// Finds what the rays of `rows` have of a grid.
-    pub(crate) fn fill(&mut self, placed: &Placed, rows: Range<usize>) {
+    pub(crate) fn fill(&mut self, among: &Among, rows: Range<usize>) {
+        let Among { placed, reaches } = among;
         let [width, height] = placed.size.map(|n| i32::try_from(n).unwrap_or(i32::MAX));
         let row = |y: usize| i32::try_from(y).unwrap_or(height).min(height);
         self.width = placed.size[0] as usize;
@@ -91,7 +59,7 @@ impl Strip {
         for (block, left) in self.blocks.iter_mut().zip((0..width).step_by(BLOCK)) {
             let right = left.saturating_add(BLOCK as i32).min(width);
             let rect = Rect { low: [left, row(rows.start)], high: [right, row(rows.end)] };
-            let near = placed.reaches.iter().enumerate().filter(|(_, reach)| !reach.meet(&rect).is_empty());
+            let near = reaches.iter().enumerate().filter(|(_, reach)| !reach.meet(&rect).is_empty());
             let clusters = near.map(|(cluster, _)| cluster);
             self.projector.gather(&frame, &rect, clusters, block, &mut self.counts);
         }
@@ -100,11 +68,11 @@ impl Strip {
     /// What the ray of a pixel has of the grid; pixels count from the first row, row by row. `near_mm` is the depth that
     /// zeta counts from.
     #[inline(always)]
-    pub(crate) fn pixel<'a>(&'a self, placed: &'a Placed, pixel: usize, near_mm: f64) -> Spans<'a> {
+    pub(crate) fn pixel<'a>(&'a self, among: &'a Among, pixel: usize, near_mm: f64) -> Spans<'a> {
         let (x, y) = (pixel % self.width, pixel / self.width);
         let block = x / BLOCK;
         let wide = BLOCK.min(self.width - block * BLOCK);
-        Spans { list: self.blocks[block].pixel(y * wide + x % BLOCK), table: &placed.table, near_mm }
+        Spans { list: self.blocks[block].pixel(y * wide + x % BLOCK), table: &among.placed.table, near_mm }
     }
 }
 
@@ -271,9 +239,9 @@ impl super::CellRenderer {
         items: &[CellItem],
         view: &View,
         options: &Options,
-    ) -> Result<Vec<Placed>, CellsError> {
+    ) -> Result<Vec<Among>, CellsError> {
         let ready = self.prepare(items)?;
         let placed = items.iter().zip(ready);
-        Ok(placed.map(|(item, ready)| Placed::new(ready, item, view, options)).collect())
+        Ok(placed.map(|(item, ready)| Among::new(Placed::new(ready, item, view, options))).collect())
     }
 }

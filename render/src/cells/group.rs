@@ -123,14 +123,14 @@ fn draw<L: Link>(
     options: &Options,
     progress: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Result<Gathered, CellsError> {
-    let (frame, manner) = (ready.frame(), ready.manner(options));
+    let (frame, manner) = (ready.placed.frame(), ready.manner(options));
     let mut queues = queues(&frame, desk.link.size(), options.spread);
     let dealt = dealt.get_or_insert_with(Dealt::nothing);
     let sent = dealt.deal(desk, item, ready, &queues)?;
     let drawing = Drawing {
         number,
-        size: ready.size,
-        lens: ready.lens,
+        size: ready.placed.size,
+        lens: ready.placed.lens,
         transfer: (*item.transfer).clone(),
         manner,
         spread: options.spread,
@@ -173,7 +173,7 @@ impl Dealt {
         ready: &Ready,
         queues: &[Vec<u32>],
     ) -> Result<Counts, LinkError> {
-        let (clusters, scalars) = (&*ready.clusters, &*ready.scalars);
+        let (clusters, scalars) = (&*ready.placed.clusters, &*ready.placed.scalars);
         let others = 1..desk.link.size();
         let mut sent = Counts::default();
         let mut send = |desk: &mut Desk<L>, to, message: Vec<u8>| {

@@ -53,7 +53,7 @@ mod tests;
 mod wire;
 mod worker;
 
-pub(crate) use among::{Placed, Spans, Strip, Walker};
+pub(crate) use among::{Among, Spans, Strip, Walker};
 pub use clusters::Faults;
 pub use early::Early;
 pub use engine::Engine;
@@ -244,7 +244,7 @@ impl CellRenderer {
     ) -> Result<CellPicture, CellsError> {
         let count = options.workers.unwrap_or_else(rayon::current_num_threads);
         let ready = self.ready(item, camera, size, options)?;
-        let (frame, manner) = (ready.frame(), ready.manner(options));
+        let (frame, manner) = (ready.placed.frame(), ready.manner(options));
         if count == 0 || count > MAX_WORKERS {
             return Err(CellsError::Workers);
         }
@@ -276,20 +276,10 @@ impl CellRenderer {
         }
         let view = View::new(camera, size)?;
         let prepared = self.prepare(std::slice::from_ref(item))?;
-        let Some((clusters, scalars)) = prepared.into_iter().next() else { return Err(CellsError::Workers) };
+        let Some(prepared) = prepared.into_iter().next() else { return Err(CellsError::Workers) };
         let prepare_ms = begin.elapsed().as_secs_f64() * 1e3;
         let begin = Instant::now();
-        Ok(Ready {
-            clusters,
-            scalars,
-            table: Table::new(&item.transfer),
-            lens: Lens::new(&view, &item.pose),
-            size,
-            skip_clear: options.skip_clear,
-            wide: options.wide && has_wide(),
-            prepare_ms,
-            begin,
-        })
+        Ok(Ready { placed: Placed::new(prepared, item, &view, options), prepare_ms, begin })
     }
 
     /// Makes ready what is not of grids and their scalars, and lets go of scalars that are not asked for.
@@ -326,8 +316,9 @@ impl CellRenderer {
     }
 }
 
-/// What a picture is drawn from.
-struct Ready {
+/// A grid before the camera.
+#[derive(Debug)]
+struct Placed {
     clusters: Arc<Clusters>,
     scalars: Arc<Scalars>,
     table: Table,
@@ -335,11 +326,22 @@ struct Ready {
     size: [u32; 2],
     skip_clear: bool,
     wide: bool,
-    prepare_ms: f64,
-    begin: Instant,
 }
 
-impl Ready {
+impl Placed {
+    /// Of the options only what is skipped and the instructions are looked at.
+    fn new((clusters, scalars): Prepared, item: &CellItem, view: &View, options: &Options) -> Self {
+        Self {
+            clusters,
+            scalars,
+            table: Table::new(&item.transfer),
+            lens: Lens::new(view, &item.pose),
+            size: view.size,
+            skip_clear: options.skip_clear,
+            wide: options.wide && has_wide(),
+        }
+    }
+
     fn frame(&self) -> Frame<'_> {
         Frame {
             clusters: &self.clusters,
@@ -352,6 +354,20 @@ impl Ready {
         }
     }
 
+    /// How many tetrahedra the grid has.
+    fn tetrahedra(&self) -> u64 {
+        (0..self.clusters.len()).map(|cluster| self.clusters.count(cluster) as u64).sum()
+    }
+}
+
+/// What a picture is drawn from.
+struct Ready {
+    placed: Placed,
+    prepare_ms: f64,
+    begin: Instant,
+}
+
+impl Ready {
     fn manner(&self, options: &Options) -> Manner {
         let side = options.early.map_or(1, |early| self.side(&early));
         let Options { early, share, balance, keep_segments: keep, .. } = *options;
@@ -360,17 +376,18 @@ impl Ready {
 
     /// Pixels that a subscreen is wide: half of what a cell is in the picture, since a cell may lie in several.
     fn side(&self, early: &Early) -> usize {
-        let longer = self.size[0].max(self.size[1]);
+        let Placed { clusters, lens, size, .. } = &self.placed;
+        let longer = size[0].max(size[1]);
         if let Some(count) = early.subscreens {
             return longer.div_ceil(count.max(1)).max(1) as usize;
         }
         let (mut sum, mut cells) = (0.0, 0.0);
-        let frame = self.frame();
-        for cluster in 0..self.clusters.len() {
+        let frame = self.placed.frame();
+        for cluster in 0..clusters.len() {
             let (reach, nearest) = frame.reach(cluster);
             if !reach.is_empty() {
-                let count = self.clusters.count(cluster) as f64;
-                let wide = self.clusters.cell_mm(cluster) * self.lens.pixels_per_mm(nearest);
+                let count = clusters.count(cluster) as f64;
+                let wide = clusters.cell_mm(cluster) * lens.pixels_per_mm(nearest);
                 sum += wide.min(f64::from(longer)) * count;
                 cells += count;
             }
@@ -379,7 +396,7 @@ impl Ready {
     }
 
     fn picture(&self, gathered: Gathered, options: &Options) -> CellPicture {
-        let [width, height] = self.size;
+        let [width, height] = self.placed.size;
         let mut image = FloatImage { width, height, pixels: Vec::new() };
         let mut segments = Segments { width, starts: vec![0], list: Vec::new() };
         for row in gathered.rows {
@@ -391,8 +408,8 @@ impl Ready {
             segments.list.extend(row.segments);
         }
         let mut stats = Stats {
-            tetrahedra: (0..self.clusters.len()).map(|c| self.clusters.count(c) as u64).sum(),
-            faults: self.clusters.faults,
+            tetrahedra: self.placed.tetrahedra(),
+            faults: self.placed.clusters.faults,
             prepare_ms: self.prepare_ms,
             ..Stats::default()
         };

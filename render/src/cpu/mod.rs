@@ -349,7 +349,7 @@ impl CpuRenderer {
             Ok(())
         })?;
         [stats.cells, stats.pixels_finished, stats.layers] = counts.map(AtomicU64::into_inner);
-        stats.tetrahedra = grids.iter().map(cells::Placed::tetrahedra).sum();
+        stats.tetrahedra = grids.iter().map(cells::Among::tetrahedra).sum();
         stats.tetrahedra_scanned = tetrahedra.into_inner();
         stats.frame_ms = begin.elapsed().as_secs_f64() * 1e3;
         Ok((FloatImage { width, height, pixels }, stats))
@@ -492,7 +492,7 @@ struct Picture<'a> {
     layered: &'a [Layered<'a>],
     depths: &'a [Depths],
     surfaces: &'a Surfaces,
-    grids: &'a [cells::Placed],
+    grids: &'a [cells::Among],
     rays: Rays,
     manner: Manner,
     size: [u32; 2],
