@@ -9,7 +9,7 @@ use render::volume::{Affine, CellGrid, Point, Vector};
 use super::cases::{self, Case, Contents};
 use super::drawers;
 use super::each;
-use super::judge::right;
+use super::pictures::{SIZES, comes_right};
 use super::random::Random;
 
 /// A grid about the origin.
@@ -76,14 +76,11 @@ fn any(random: &mut Random, size: f64) -> CellItem {
     }
 }
 
-/// Refuses a picture by the processor that is off by more than `most`/255, also with steps an eighth and a sixty-fourth as long:
-/// a jump in a transfer function may hide a thin shell of a volume in any step.
+/// Refuses a picture by the processor that is off by more than `most`/255.
 fn check(random: &mut Random, case: &Case, most: f64) -> Result<(), String> {
-    let size = random.one(&[[8, 8], [9, 5], [3, 16], [1, 1]]);
-    let drawer = drawers::processor();
-    let judged = |voxels: f64| right(&case.scene, &(drawer.draw)(&case.scene, size, voxels)?, most);
+    let size = random.one(&SIZES);
     let fine = if case.scene.volumes.is_empty() { 0.25 } else { cases::fine(case) };
-    judged(fine).or_else(|_| judged(fine / 8.0)).or_else(|_| judged(fine / 64.0))
+    comes_right(&drawers::processor(), case, size, fine, most)
 }
 
 #[test]

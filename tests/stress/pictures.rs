@@ -11,25 +11,32 @@ use super::{each, shapes};
 
 /// What a picture at fine sub-steps may be off by, in 1/255: the bound of the contract's finest quality.
 const MOST: f64 = 2.0;
-const SIZES: [[u32; 2]; 4] = [[8, 8], [9, 5], [3, 16], [1, 1]];
+pub(super) const SIZES: [[u32; 2]; 4] = [[8, 8], [9, 5], [3, 16], [1, 1]];
 
 fn check(random: &mut Random, case: &Case) -> Result<(), String> {
     let size = random.one(&SIZES);
     check_sized(case, size)
 }
 
-/// A jump in a transfer function may hide a thin shell in any sub-step: a picture that is wrong is drawn again with
-/// steps an eighth and a sixty-fourth as long, and must come right.
 fn check_sized(case: &Case, size: [u32; 2]) -> Result<(), String> {
-    for Drawer { name, draw } in drawers::all() {
-        let judged = |voxels: f64| {
-            let picture = draw(&case.scene, size, voxels).map_err(|e| format!("{name}: {e}"))?;
-            right(&case.scene, &picture, MOST).map_err(|e| format!("{name}: {e}"))
-        };
-        let fine = cases::fine(case);
-        judged(fine).or_else(|_| judged(fine / 8.0)).or_else(|_| judged(fine / 64.0))?;
-    }
-    Ok(())
+    drawers::all().iter().try_for_each(|drawer| comes_right(drawer, case, size, cases::fine(case), MOST))
+}
+
+/// Refuses a picture with steps of `fine` voxels that is off by more than `most`/255. A jump in a transfer function may hide
+/// a thin shell in any sub-step: a picture that is wrong is drawn again with steps an eighth and a sixty-fourth as long,
+/// and must come right.
+pub(super) fn comes_right(
+    Drawer { name, draw }: &Drawer,
+    case: &Case,
+    size: [u32; 2],
+    fine: f64,
+    most: f64,
+) -> Result<(), String> {
+    let judged = |voxels: f64| {
+        let picture = draw(&case.scene, size, voxels).map_err(|e| format!("{name}: {e}"))?;
+        right(&case.scene, &picture, most).map_err(|e| format!("{name}: {e}"))
+    };
+    judged(fine).or_else(|_| judged(fine / 8.0)).or_else(|_| judged(fine / 64.0))
 }
 
 #[test]
