@@ -27,6 +27,11 @@ impl Lens {
         }
     }
 
+    /// Whether rays come from one eye.
+    pub(super) fn perspective(&self) -> bool {
+        self.perspective
+    }
+
     /// Numbers that make one up.
     pub(super) const NUMBERS: usize = 17;
 
@@ -53,22 +58,22 @@ impl Lens {
 
     /// A point with its scalar before the camera.
     #[inline(always)]
-    pub(super) fn corner(&self, p: &[f64; 3], value: f64) -> Corner {
+    pub(super) fn corner(&self, p: &[f64; 3], scalar: f64) -> Corner {
         let [x, y, z] = self.view_from_grid.map(|m| m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3]);
         // A point at the eye itself is on no ray and all: it counts as just before it.
         let z = if x == 0.0 && y == 0.0 && z == 0.0 { 1e-30 } else { z };
         let [x, y] = [x * self.scale[0], y * self.scale[1]];
         let [mx, my] = self.middle;
         if !self.perspective {
-            return Corner { x: x + mx, y: y + my, w: 1.0, depth: z, weight: 1.0, value, z };
+            return Corner { x: x + mx, y: y + my, w: 1.0, z, rank: z, scalar };
         }
         // Nearer to the eye's plane a quotient would grow without bound.
         if z > 1e-6 && z * 1e6 > x.abs().max(y.abs()) {
             let weight = 1.0 / z;
             let [x, y] = [x * weight + mx, y * weight + my];
-            return Corner { x, y, w: 1.0, depth: 1.0, weight, value: value * weight, z };
+            return Corner { x, y, w: 1.0, z, rank: -weight, scalar };
         }
-        Corner { x: x + mx * z, y: y + my * z, w: z, depth: z, weight: 1.0, value, z }
+        Corner { x: x + mx * z, y: y + my * z, w: z, z, rank: f64::NAN, scalar }
     }
 
     /// Millimetres along a pixel's ray for one of depth.

@@ -374,7 +374,7 @@ impl Projector {
             let index = shown.tetrahedron as usize;
             let corners = tetrahedra[index].map(|v| &self.corners[v as usize]);
             let constant = constants.map(|values| values[index] as f32);
-            scan(corners, [tile, &reach], &mut self.gathered, &mut |raws| go_on(raws, constant));
+            scan(corners, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut |raws| go_on(raws, constant));
             if constant.is_some() {
                 go_on(self.gathered.take(), constant);
             }
@@ -440,7 +440,7 @@ impl Projector {
                     }
                 }
             };
-            scan(corners, [tile, &reach], &mut self.gathered, &mut keep);
+            scan(corners, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut keep);
             keep(self.gathered.take());
         }
     }

@@ -1,0 +1,232 @@
+//! Scan conversion: which pixels' rays pass a tetrahedron, and where they enter and leave it.
+//!
+//! A corner before the camera is a point (x, y, w) of the projective plane, in pixels, where whole numbers are the
+//! middles of pixels; w is 1 but for corners beside or behind a perspective eye, which no division reaches. Rays that pass
+//! clear of a cell's edges are told by the planes of its faces (`planes`), all others by exact predicates (`sides`). Depth
+//! on a face is that of its plane, or where it has none the mean of its corners': cells that share the face get the same
+//! bits, and each ray passes it in both of them or in neither.
+
+mod planes;
+mod sides;
+
+use planes::Cell;
+use sides::Sides;
+
+/// Pixels that go at once.
+const LANES: usize = 4;
+
+/// One of each pixel of a group, where no access of memory straddles two lines of a cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
+struct Lanes<T>([T; LANES]);
+
+/// A corner before the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Corner {
+    /// Place in the picture, pixels, times w.
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) w: f64,
+    /// Depth; mm before the eye plane.
+    pub(super) z: f64,
+    /// What runs linearly over the picture and grows with depth: see `planes`. Not a number where w is not 1.
+    pub(super) rank: f64,
+    pub(super) scalar: f64,
+}
+
+/// Pixels from `low` up to but not at `high`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Rect {
+    pub(super) low: [i32; 2],
+    pub(super) high: [i32; 2],
+}
+
+impl Rect {
+    #[inline(always)]
+    pub(super) fn is_empty(&self) -> bool {
+        self.low[0] >= self.high[0] || self.low[1] >= self.high[1]
+    }
+
+    #[inline(always)]
+    pub(super) fn meet(&self, other: &Self) -> Self {
+        Self {
+            low: [0, 1].map(|a| self.low[a].max(other.low[a])),
+            high: [0, 1].map(|a| self.high[a].min(other.high[a])),
+        }
+    }
+
+    pub(super) fn size(&self) -> [usize; 2] {
+        [0, 1].map(|a| usize::try_from(self.high[a] - self.low[a]).unwrap_or(0))
+    }
+
+    /// How many pixels.
+    pub(super) fn area(&self) -> usize {
+        self.size().into_iter().product()
+    }
+
+    /// The pixels whose rays may pass between corners: all of `within` where one of them is not before the eye.
+    #[inline(always)]
+    pub(super) fn around<'a>(corners: impl IntoIterator<Item = &'a Corner>, within: &Self) -> Self {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for c in corners {
+            if c.w != 1.0 {
+                return *within;
+            }
+            low = [low[0].min(c.x), low[1].min(c.y)];
+            high = [high[0].max(c.x), high[1].max(c.y)];
+        }
+        // `as` saturates; one more keeps the range half open.
+        let found = Self {
+            low: low.map(|v| v.ceil() as i32),
+            high: high.map(|v| (v.floor() as i32).saturating_add(1)),
+        };
+        found.meet(within)
+    }
+}
+
+/// What a ray has of one cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Raw {
+    /// Depth where it enters and leaves; mm before the eye plane.
+    pub(super) front: f64,
+    pub(super) back: f64,
+    /// The scalar there.
+    pub(super) values: [f32; 2],
+    /// Which of the rectangle's, row by row.
+    pub(super) pixel: u32,
+}
+
+
+/// Corners of a face, and for each the edge across from it.
+const FACES: [([usize; 3], [usize; 3]); 4] =
+    [([1, 2, 3], [5, 4, 3]), ([0, 2, 3], [5, 2, 1]), ([0, 1, 3], [4, 2, 0]), ([0, 1, 2], [3, 1, 0])];
+/// What is gathered before it is handed on.
+const GATHERED: usize = 256;
+
+/// What rays have of cells, gathered until there is enough of it.
+#[derive(Debug)]
+pub(super) struct Raws {
+    list: [Raw; GATHERED + LANES],
+    count: usize,
+}
+
+impl Default for Raws {
+    fn default() -> Self {
+        let none = Raw { front: 0.0, back: 0.0, values: [0.0; 2], pixel: 0 };
+        Self { list: [none; GATHERED + LANES], count: 0 }
+    }
+}
+
+impl Raws {
+    /// Takes out what is there.
+    #[inline(always)]
+    pub(super) fn take(&mut self) -> &[Raw] {
+        &self.list[..std::mem::take(&mut self.count)]
+    }
+
+    /// Adds what the rays of a group pass, of those that pass it.
+    #[inline(always)]
+    fn add_all(&mut self, first: u32, lanes: usize, hit: &Lanes<u64>, depths: &[Lanes<f64>; 2], values: &[Lanes<f64>; 2]) {
+        for lane in 0..LANES {
+            let of = |of: &[Lanes<f64>; 2]| [of[0].0[lane], of[1].0[lane]];
+            let [front, back] = of(depths);
+            let values = of(values).map(|v| v as f32);
+            self.list[self.count] = Raw { front, back, values, pixel: first + lane as u32 };
+            self.count += usize::from(lane < lanes) & hit.0[lane] as usize;
+        }
+    }
+
+    /// Adds where a ray passes two faces, if it does so before the eye.
+    #[inline(always)]
+    fn add(&mut self, pixel: u32, [a, b]: [[f64; 2]; 2]) {
+        let [mut front, mut from] = if a[0] <= b[0] { a } else { b };
+        let [back, to] = if a[0] <= b[0] { b } else { a };
+        if back > 0.0 && back > front {
+            if front < 0.0 {
+                from += (to - from) * (front / (front - back));
+                front = 0.0;
+            }
+            self.list[self.count] = Raw { front, back, values: [from as f32, to as f32], pixel };
+            self.count += 1;
+        }
+    }
+}
+
+/// Finds what the rays of `reach`, which lies within `rect`, have of a tetrahedron. Its corners stand in the order of their
+/// numbers. Pixels are counted in `rect`. Whenever much is gathered it goes to `full`; what is left stays in `raws`.
+#[inline(always)]
+pub(super) fn scan(
+    corners: [&Corner; 4],
+    rects: [&Rect; 2],
+    perspective: bool,
+    raws: &mut Raws,
+    full: &mut impl FnMut(&[Raw]),
+) {
+    let corners = &corners;
+    let Some(cell) = Cell::new(corners, perspective) else {
+        flat(corners, rects, perspective, raws, full);
+        return;
+    };
+    match (cell.near, perspective) {
+        (1, false) => clear::<1, false>(&cell, corners, rects, raws, full),
+        (2, false) => clear::<2, false>(&cell, corners, rects, raws, full),
+        (_, false) => clear::<3, false>(&cell, corners, rects, raws, full),
+        (1, true) => clear::<1, true>(&cell, corners, rects, raws, full),
+        (2, true) => clear::<2, true>(&cell, corners, rects, raws, full),
+        (_, true) => clear::<3, true>(&cell, corners, rects, raws, full),
+    }
+}
+
+/// The same of a cell that has planes, `NEAR` of them near.
+#[inline(always)]
+fn clear<const NEAR: usize, const PERSPECTIVE: bool>(
+    cell: &Cell,
+    corners: &[&Corner; 4],
+    [rect, reach]: [&Rect; 2],
+    raws: &mut Raws,
+    full: &mut impl FnMut(&[Raw]),
+) {
+    let width = rect.high[0] - rect.low[0];
+    for j in reach.low[1]..reach.high[1] {
+        let before = (j - rect.low[1]) * width - rect.low[0];
+        let row = cell.row(j);
+        let mut i = reach.low[0];
+        while i < reach.high[0] {
+            let passed = cell.pass::<NEAR, PERSPECTIVE>(&row, i);
+            let lanes = LANES.min((reach.high[0] - i) as usize);
+            let first = (before + i) as u32;
+            if passed.clear.0 == [u64::MAX; LANES] {
+                raws.add_all(first, lanes, &passed.hit, &passed.depths, &passed.values);
+            } else {
+                Sides::new(corners, PERSPECTIVE).pass([i, j], first, lanes, raws);
+            }
+            if raws.count >= GATHERED {
+                full(raws.take());
+            }
+            i += LANES as i32;
+        }
+    }
+}
+
+/// The same of a cell without planes.
+#[inline(never)]
+fn flat(
+    corners: &[&Corner; 4],
+    [rect, reach]: [&Rect; 2],
+    perspective: bool,
+    raws: &mut Raws,
+    full: &mut impl FnMut(&[Raw]),
+) {
+    let width = rect.high[0] - rect.low[0];
+    let sides = Sides::new(corners, perspective);
+    for j in reach.low[1]..reach.high[1] {
+        let before = (j - rect.low[1]) * width - rect.low[0];
+        for i in (reach.low[0]..reach.high[0]).step_by(LANES) {
+            let lanes = LANES.min((reach.high[0] - i) as usize);
+            sides.pass([i, j], (before + i) as u32, lanes, raws);
+            if raws.count >= GATHERED {
+                full(raws.take());
+            }
+        }
+    }
+}
