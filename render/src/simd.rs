@@ -1,4 +1,6 @@
-//! Which instructions the machine has.
+//! Which instructions the machine has, and four numbers at once by them.
+
+use std::ops::{Add, Mul, Sub};
 
 /// Whether it has AVX2 and what goes with it.
 pub(crate) fn has_wide() -> bool {
@@ -11,4 +13,217 @@ pub(crate) fn has_wide() -> bool {
     }
     #[cfg(not(target_arch = "x86_64"))]
     false
+}
+
+/// Four numbers, each rounded as one alone is: all kinds give the same bits.
+pub(crate) trait Four:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// The same four times.
+    fn all(v: f64) -> Self;
+    fn from_array(v: [f64; 4]) -> Self;
+    fn to_array(self) -> [f64; 4];
+    /// What one over each is.
+    fn inverse(self) -> Self;
+    fn abs(self) -> Self;
+    /// The less of each two; the other's where either is not a number.
+    fn least(self, other: Self) -> Self;
+    /// The greater of each two; the other's where either is not a number.
+    fn most(self, other: Self) -> Self;
+    /// Which are less than the other's, a bit each.
+    fn below(self, other: Self) -> u32;
+    /// Each two bits of `ORDER` say which comes there, the lowest first.
+    fn picked<const ORDER: i32>(self) -> Self;
+    /// Rounded to half as many bits.
+    fn to_f32(self) -> [f32; 4];
+}
+
+/// By whatever instructions there are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Plain([f64; 4]);
+
+impl Plain {
+    #[inline(always)]
+    fn with(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
+        Self(std::array::from_fn(|n| of(self.0[n], other.0[n])))
+    }
+}
+
+impl Add for Plain {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.with(other, |a, b| a + b)
+    }
+}
+
+impl Sub for Plain {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.with(other, |a, b| a - b)
+    }
+}
+
+impl Mul for Plain {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.with(other, |a, b| a * b)
+    }
+}
+
+impl Four for Plain {
+    #[inline(always)]
+    fn all(v: f64) -> Self {
+        Self([v; 4])
+    }
+
+    #[inline(always)]
+    fn from_array(v: [f64; 4]) -> Self {
+        Self(v)
+    }
+
+    #[inline(always)]
+    fn to_array(self) -> [f64; 4] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        self.with(self, |v, _| 1.0 / v)
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.with(self, |v, _| v.abs())
+    }
+
+    #[inline(always)]
+    fn least(self, other: Self) -> Self {
+        self.with(other, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn most(self, other: Self) -> Self {
+        self.with(other, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn below(self, other: Self) -> u32 {
+        (0..4).fold(0, |bits, n| bits | u32::from(self.0[n] < other.0[n]) << n)
+    }
+
+    #[inline(always)]
+    fn picked<const ORDER: i32>(self) -> Self {
+        Self(std::array::from_fn(|n| self.0[(ORDER >> (2 * n) & 3) as usize]))
+    }
+
+    #[inline(always)]
+    fn to_f32(self) -> [f32; 4] {
+        self.0.map(|v| v as f32)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use wide::Wide;
+
+#[cfg(target_arch = "x86_64")]
+#[expect(unsafe_code, reason = "instructions that the machine has to be asked for")]
+mod wide {
+    use std::arch::x86_64::{
+        __m256d, _mm_storeu_ps, _mm256_add_pd, _mm256_and_pd, _mm256_castsi256_pd, _mm256_cmp_pd, _mm256_cvtpd_ps,
+        _mm256_div_pd, _mm256_loadu_pd, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd,
+        _mm256_permute4x64_pd, _mm256_set1_epi64x, _mm256_set1_pd, _mm256_storeu_pd, _mm256_sub_pd, _CMP_LT_OQ,
+    };
+    use std::ops::{Add, Mul, Sub};
+
+    use super::Four;
+
+    /// By AVX2. Only code that is called where [`super::has_wide`] says yes names this type.
+    #[derive(Debug, Clone, Copy)]
+    pub(crate) struct Wide(__m256d);
+
+    // SAFETY, of all below: this type is only named where the instructions were detected; loads and stores are of arrays as
+    // long as a register.
+
+    impl Add for Wide {
+        type Output = Self;
+        #[inline(always)]
+        fn add(self, other: Self) -> Self {
+            Self(unsafe { _mm256_add_pd(self.0, other.0) })
+        }
+    }
+
+    impl Sub for Wide {
+        type Output = Self;
+        #[inline(always)]
+        fn sub(self, other: Self) -> Self {
+            Self(unsafe { _mm256_sub_pd(self.0, other.0) })
+        }
+    }
+
+    impl Mul for Wide {
+        type Output = Self;
+        #[inline(always)]
+        fn mul(self, other: Self) -> Self {
+            Self(unsafe { _mm256_mul_pd(self.0, other.0) })
+        }
+    }
+
+    impl Four for Wide {
+        #[inline(always)]
+        fn all(v: f64) -> Self {
+            Self(unsafe { _mm256_set1_pd(v) })
+        }
+
+        #[inline(always)]
+        fn from_array(v: [f64; 4]) -> Self {
+            Self(unsafe { _mm256_loadu_pd(v.as_ptr()) })
+        }
+
+        #[inline(always)]
+        fn to_array(self) -> [f64; 4] {
+            let mut v = [0.0; 4];
+            unsafe { _mm256_storeu_pd(v.as_mut_ptr(), self.0) };
+            v
+        }
+
+        #[inline(always)]
+        fn inverse(self) -> Self {
+            Self(unsafe { _mm256_div_pd(_mm256_set1_pd(1.0), self.0) })
+        }
+
+        #[inline(always)]
+        fn abs(self) -> Self {
+            Self(unsafe { _mm256_and_pd(self.0, _mm256_castsi256_pd(_mm256_set1_epi64x(i64::MAX))) })
+        }
+
+        #[inline(always)]
+        fn least(self, other: Self) -> Self {
+            Self(unsafe { _mm256_min_pd(self.0, other.0) })
+        }
+
+        #[inline(always)]
+        fn most(self, other: Self) -> Self {
+            Self(unsafe { _mm256_max_pd(self.0, other.0) })
+        }
+
+        #[inline(always)]
+        fn below(self, other: Self) -> u32 {
+            unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
+        }
+
+        #[inline(always)]
+        fn picked<const ORDER: i32>(self) -> Self {
+            Self(unsafe { _mm256_permute4x64_pd::<ORDER>(self.0) })
+        }
+
+        #[inline(always)]
+        fn to_f32(self) -> [f32; 4] {
+            let mut v = [0.0; 4];
+            unsafe { _mm_storeu_ps(v.as_mut_ptr(), _mm256_cvtpd_ps(self.0)) };
+            v
+        }
+    }
 }

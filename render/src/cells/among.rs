@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use super::blocks::{Near, in_view};
 use super::project::{Gathered, Projector};
 use super::scan::{Raw, Rect};
 use super::stats::Counts;
@@ -14,18 +15,17 @@ use super::{CellsError, Options, Placed};
 use crate::scene::CellItem;
 use crate::view::View;
 
-/// A grid before the camera, with the pixels that each cluster may show in.
+/// A grid before the camera, with what of it may show.
 #[derive(Debug)]
 pub(crate) struct Among {
     placed: Placed,
-    reaches: Vec<Rect>,
+    near: Vec<Near>,
 }
 
 impl Among {
     fn new(placed: Placed) -> Self {
-        let frame = placed.frame();
-        let reaches = (0..placed.clusters.len()).map(|cluster| frame.reach(cluster).0).collect();
-        Self { placed, reaches }
+        let (near, _) = in_view(&placed.frame());
+        Self { placed, near }
     }
 
     /// How many tetrahedra the grid has.
@@ -50,7 +50,7 @@ pub(crate) struct Strip {
 impl Strip {
     /// Finds what the rays of `rows` have of a grid.
     pub(crate) fn fill(&mut self, among: &Among, rows: Range<usize>) {
-        let Among { placed, reaches } = among;
+        let Among { placed, near } = among;
         let [width, height] = placed.size.map(|n| i32::try_from(n).unwrap_or(i32::MAX));
         let row = |y: usize| i32::try_from(y).unwrap_or(height).min(height);
         self.width = placed.size[0] as usize;
@@ -59,8 +59,7 @@ impl Strip {
         for (block, left) in self.blocks.iter_mut().zip((0..width).step_by(BLOCK)) {
             let right = left.saturating_add(BLOCK as i32).min(width);
             let rect = Rect { low: [left, row(rows.start)], high: [right, row(rows.end)] };
-            let near = reaches.iter().enumerate().filter(|(_, reach)| !reach.meet(&rect).is_empty());
-            let clusters = near.map(|(cluster, _)| cluster);
+            let clusters = near.iter().filter(|near| !near.reach.meet(&rect).is_empty()).map(Near::cluster);
             self.projector.gather(&frame, &rect, clusters, block, &mut self.counts);
         }
     }

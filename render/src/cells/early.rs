@@ -37,6 +37,8 @@ impl Default for Early {
 /// The table of one worker, and the depth at which each pixel is terminated.
 #[derive(Debug)]
 pub(super) struct Table {
+    /// Of the picture that it is about.
+    low: [i32; 2],
     size: [usize; 2],
     /// Pixels that a subscreen is wide and high.
     side: usize,
@@ -50,11 +52,12 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// A table of subscreens of `side` pixels.
-    pub(super) fn new(size: [u32; 2], side: usize) -> Self {
-        let size = size.map(|n| n as usize);
+    /// A table of subscreens of `side` pixels of a part of the picture, whose pixels it counts.
+    pub(super) fn new(rect: &Rect, side: usize) -> Self {
+        let size = rect.size();
         let [across, down] = size.map(|n| n.div_ceil(side));
         Self {
+            low: rect.low,
             size,
             side,
             across,
@@ -78,10 +81,11 @@ impl Table {
         }
     }
 
-    /// Whether nothing of a rectangle that lies behind a depth can be seen.
+    /// Whether nothing of a rectangle within it that lies behind a depth can be seen.
     pub(super) fn hides(&self, rect: &Rect, nearest: f64) -> bool {
-        let [x0, y0] = rect.low.map(|v| v as usize / self.side);
-        let [x1, y1] = rect.high.map(|v| (v as usize).saturating_sub(1) / self.side);
+        let place = |axis: usize, v: i32| (v - self.low[axis]) as usize / self.side;
+        let [x0, y0] = [0, 1].map(|axis| place(axis, rect.low[axis]));
+        let [x1, y1] = [0, 1].map(|axis| place(axis, rect.high[axis] - 1));
         (y0..=y1).all(|y| (x0..=x1).all(|x| self.deepest[y * self.across + x] < nearest))
     }
 

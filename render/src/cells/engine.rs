@@ -10,8 +10,11 @@ use super::worker::{Gathered, Manner, Start, Step, Worker};
 /// What drives workers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Engine {
-    /// A thread each.
+    /// None: threads share out the picture instead of the grid, which all of them have at hand. `spread`, `balance` and
+    /// `share` are not looked at.
     #[default]
+    Blocks,
+    /// A thread each.
     Threads,
     /// All in turn on the calling thread, each with a clock that its work moves on; the one that is furthest behind goes
     /// next. For measuring how work is shared out among more workers than there are cores.
@@ -59,7 +62,7 @@ impl Engine {
             .collect();
         match self {
             Self::Threads => threads(workers, &post, total, jobs.progress),
-            Self::Simulated => {
+            Self::Blocks | Self::Simulated => {
                 simulate(&mut workers, &post, total, jobs.progress)?;
                 workers.into_iter().next().map(Worker::into_gathered).ok_or(CellsError::Workers)
             }

@@ -2,8 +2,11 @@
 
 use std::cmp::Ordering;
 
+use super::lists::Lists;
 use super::scan::Raw;
+use super::stats::Counts;
 use super::table::{Table, opacity};
+use super::worker::Row;
 
 /// A stretch of a pixel's ray with what is seen of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -165,4 +168,37 @@ pub(super) fn merge(segments: &[Segment], mut done: impl FnMut(Segment)) {
         }
     }
     done(run);
+}
+
+/// Composites what a pixel's list has; `kept` gets its runs. `list` is for reuse.
+#[inline(always)]
+pub(super) fn composite(
+    lists: &Lists,
+    pixel: usize,
+    list: &mut Vec<Segment>,
+    mut kept: Option<&mut Row>,
+    counts: &mut Counts,
+) -> [f32; 4] {
+    let mut color = [0.0; 4];
+    list.clear();
+    list.extend(lists.pixel(pixel));
+    // The nearest clusters came first, and lists begin with what came last.
+    list.reverse();
+    list.sort_unstable_by(Segment::order);
+    if overlap(list) {
+        counts.overlapping_pixels += 1;
+        add_up(list);
+    }
+    let mut runs = 0;
+    merge(list, |run| {
+        under(&mut color, run.rgba);
+        if let Some(row) = &mut kept {
+            row.segments.push(run);
+            runs += 1;
+        }
+    });
+    if let Some(row) = kept {
+        row.counts.push(runs);
+    }
+    color
 }

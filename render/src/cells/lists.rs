@@ -23,6 +23,13 @@ impl Lists {
         Self { heads: vec![NONE; pixels], nodes: Vec::new(), scratch: Default::default() }
     }
 
+    /// Forgets all, for so many pixels.
+    pub(super) fn reset(&mut self, pixels: usize) {
+        self.heads.clear();
+        self.heads.resize(pixels, NONE);
+        self.nodes.clear();
+    }
+
     /// Adds a segment in no order.
     pub(super) fn add(&mut self, pixel: usize, segment: Segment) {
         self.nodes.push(Node { segment, next: self.heads[pixel] });

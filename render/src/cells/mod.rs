@@ -29,12 +29,14 @@
 //! order of the grid's cells, or on the processor's instructions. With it they depend on the workers' timing, within its bound.
 
 mod among;
+mod blocks;
 mod bytes;
 mod clusters;
 mod early;
 mod engine;
 mod fold;
 mod group;
+mod in_view;
 mod lens;
 mod link;
 mod lists;
@@ -116,7 +118,7 @@ impl Default for Options {
         Self {
             early: None,
             workers: None,
-            engine: Engine::Threads,
+            engine: Engine::Blocks,
             spread: Spread::Columns,
             balance: true,
             share: true,
@@ -248,8 +250,12 @@ impl CellRenderer {
         if count == 0 || count > MAX_WORKERS {
             return Err(CellsError::Workers);
         }
-        let jobs = Jobs { queues: queues(&frame, count, options.spread), progress };
-        let gathered = options.engine.run(&frame, manner, jobs)?;
+        let gathered = if options.engine == Engine::Blocks {
+            blocks::run(&frame, manner, count, progress)?
+        } else {
+            let jobs = Jobs { queues: queues(&frame, count, options.spread), progress };
+            options.engine.run(&frame, manner, jobs)?
+        };
         Ok(ready.picture(gathered, options))
     }
 

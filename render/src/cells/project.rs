@@ -3,11 +3,14 @@
 use super::clusters::{Clusters, Scalars};
 use super::early;
 use super::fold::{Segment, add_up, integrate, length, merge, overlap, sort, under};
+use super::in_view::{InView, Shown};
 use super::lens::Lens;
-use super::scan::{Corner, Raw, Raws, Rect, scan};
+use super::scan::{Raw, Raws, Rect, scan};
 use super::stats::Counts;
 use super::table::{BATCH, Batch, Table};
-use crate::volume::cells::Place;
+#[cfg(target_arch = "x86_64")]
+use crate::simd::Wide;
+use crate::simd::{Four, Plain};
 
 /// Pixels that a cluster is drawn in at once, across and down: what it makes there has to be remembered.
 const TILE: i32 = 128;
@@ -46,15 +49,6 @@ impl Frame<'_> {
     }
 }
 
-/// A tetrahedron in a tile.
-#[derive(Debug, Clone, Copy)]
-struct Shown {
-    tetrahedron: u32,
-    reach: Rect,
-    /// Nearest and farthest depth, added.
-    depth: f64,
-}
-
 /// What a pixel has of a cluster while its tetrahedra are gone through.
 #[derive(Debug, Clone, Copy)]
 struct Open {
@@ -69,9 +63,6 @@ struct Open {
 const NONE: u32 = u32::MAX;
 /// Cells overlap here: their stretches are needed one by one.
 const MIXED: u32 = u32::MAX - 1;
-
-/// Steps of depth in which tetrahedra are told apart for going through them from front to back.
-const STEPS: usize = 256;
 
 /// What the rays of a rectangle have of a grid.
 #[derive(Debug, Default)]
@@ -90,14 +81,18 @@ impl Gathered {
     }
 }
 
+/// A cluster, and what of it is before the camera.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cluster<'a> {
+    pub(super) cluster: usize,
+    pub(super) view: &'a InView,
+}
+
 /// What is kept from cluster to cluster.
 #[derive(Debug, Default)]
 pub(super) struct Projector {
-    values: Vec<f64>,
-    corners: Vec<Corner>,
     shown: Vec<Shown>,
     gathered: Box<Raws>,
-    nearest_first: Vec<Shown>,
     open: Vec<Open>,
     /// Runs put aside, each with the one before it.
     aside: Vec<(Segment, u32)>,
@@ -105,22 +100,21 @@ pub(super) struct Projector {
     counts: Vec<u32>,
     ordered: Vec<Raw>,
     spans: Vec<Segment>,
-    /// Runs of a cluster, for a worker that cannot take them while it is drawn.
-    pub(super) runs: Vec<(usize, Segment)>,
 }
 
 impl Projector {
-    /// Draws a cluster: hands on segments with the pixels they are of.
+    /// Draws what the rays of `rect` have of a cluster: hands on segments with the pixels of `rect` that they are of.
     pub(super) fn draw(
         &mut self,
         frame: &Frame<'_>,
-        cluster: usize,
+        of: Cluster<'_>,
+        rect: &Rect,
         early: Option<&early::Table>,
         counts: &mut Counts,
         mut done: impl FnMut(usize, Segment),
     ) {
         if !frame.wide {
-            self.project(frame, cluster, early, counts, &mut done);
+            self.draw_by::<Plain>(frame, of, rect, early, counts, &mut done);
             return;
         }
         #[cfg(target_arch = "x86_64")]
@@ -129,54 +123,90 @@ impl Projector {
             fn wide(
                 projector: &mut Projector,
                 frame: &Frame<'_>,
-                cluster: usize,
+                of: Cluster<'_>,
+                rect: &Rect,
                 early: Option<&early::Table>,
                 counts: &mut Counts,
                 done: &mut impl FnMut(usize, Segment),
             ) {
-                projector.project(frame, cluster, early, counts, done);
+                projector.draw_by::<Wide>(frame, of, rect, early, counts, done);
             }
             #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
             // SAFETY: `wide` is set only where these instructions were detected.
             unsafe {
-                wide(self, frame, cluster, early, counts, &mut done);
+                wide(self, frame, of, rect, early, counts, &mut done);
             }
         }
     }
 
+    #[inline(always)]
+    fn draw_by<F: Four>(
+        &mut self,
+        frame: &Frame<'_>,
+        of: Cluster<'_>,
+        rect: &Rect,
+        early: Option<&early::Table>,
+        counts: &mut Counts,
+        done: &mut impl FnMut(usize, Segment),
+    ) {
+        self.shown.clear();
+        let mut reach = Rect { low: rect.high, high: rect.low };
+        for shown in &of.view.cells {
+            let mine = shown.reach.meet(rect);
+            if mine.is_empty() {
+                continue;
+            }
+            if early.is_some_and(|table| table.hides(&mine, shown.depths[0])) {
+                counts.hidden += 1;
+                continue;
+            }
+            counts.scanned += 1;
+            reach = reach.join(&mine);
+            self.shown.push(Shown { reach: mine, ..*shown });
+        }
+        let mut top = reach.low[1];
+        while top < reach.high[1] {
+            let mut left = reach.low[0];
+            while left < reach.high[0] {
+                let tile = Rect { low: [left, top], high: [left + TILE, top + TILE] }.meet(&reach);
+                self.convert::<F>(frame, of, [rect, &tile], counts, done);
+                left += TILE;
+            }
+            top += TILE;
+        }
+    }
+
     /// Finds what the rays of a rectangle have of clusters, nearest first for each.
-    pub(super) fn gather(
+    pub(super) fn gather<'a>(
         &mut self,
         frame: &Frame<'_>,
         rect: &Rect,
-        clusters: impl Iterator<Item = usize>,
+        clusters: impl Iterator<Item = Cluster<'a>>,
         gathered: &mut Gathered,
         counts: &mut Counts,
     ) {
         self.counts.clear();
         self.counts.resize(rect.area(), 0);
         self.raws.clear();
-        for cluster in clusters {
+        for of in clusters {
+            self.shown.clear();
+            let cells = of.view.cells.iter().filter(|shown| !shown.reach.meet(rect).is_empty());
+            self.shown.extend(cells);
+            counts.scanned += self.shown.len() as u64;
             if !frame.wide {
-                self.gather_cluster(frame, rect, cluster, counts);
+                self.collect::<Plain>(frame, of, rect, None);
                 continue;
             }
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-                fn wide(
-                    projector: &mut Projector,
-                    frame: &Frame<'_>,
-                    rect: &Rect,
-                    cluster: usize,
-                    counts: &mut Counts,
-                ) {
-                    projector.gather_cluster(frame, rect, cluster, counts);
+                fn wide(projector: &mut Projector, frame: &Frame<'_>, of: Cluster<'_>, rect: &Rect) {
+                    projector.collect::<Wide>(frame, of, rect, None);
                 }
                 #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
                 // SAFETY: `wide` is set only where these instructions were detected.
                 unsafe {
-                    wide(self, frame, rect, cluster, counts);
+                    wide(self, frame, of, rect);
                 }
             }
         }
@@ -189,31 +219,6 @@ impl Projector {
         }
         std::mem::swap(&mut self.counts, &mut gathered.ends);
         std::mem::swap(&mut self.ordered, &mut gathered.raws);
-    }
-
-    #[inline(always)]
-    fn gather_cluster(&mut self, frame: &Frame<'_>, rect: &Rect, cluster: usize, counts: &mut Counts) {
-        if frame.skip_clear && frame.table.is_clear(frame.scalars.range(cluster)) {
-            counts.clear += frame.clusters.count(cluster) as u64;
-            return;
-        }
-        self.place(frame, cluster);
-        self.choose(frame, cluster, rect, None, counts);
-        self.collect(frame, cluster, rect, None);
-    }
-
-    /// Brings corners and values of a cluster before the camera.
-    #[inline(always)]
-    fn place(&mut self, frame: &Frame<'_>, cluster: usize) {
-        let of_points = frame.scalars.place() == Place::Points;
-        let raw = frame.scalars.of(cluster);
-        self.values.clear();
-        self.values.extend(raw.iter().map(|&v| frame.table.position(v)));
-        self.corners.clear();
-        let points = frame.clusters.points(cluster).iter().enumerate();
-        let values = &self.values;
-        self.corners
-            .extend(points.map(|(i, p)| frame.lens.corner(p, if of_points { values[i] } else { 0.0 })));
     }
 
     /// Puts what was scan-converted together by pixel; `counts` become where each pixel's end.
@@ -233,124 +238,13 @@ impl Projector {
         }
     }
 
-    #[inline(always)]
-    fn project(
-        &mut self,
-        frame: &Frame<'_>,
-        cluster: usize,
-        early: Option<&early::Table>,
-        counts: &mut Counts,
-        done: &mut impl FnMut(usize, Segment),
-    ) {
-        let count = frame.clusters.count(cluster) as u64;
-        let (reach, nearest) = frame.reach(cluster);
-        if reach.is_empty() {
-            counts.outside += count;
-            return;
-        }
-        if frame.skip_clear && frame.table.is_clear(frame.scalars.range(cluster)) {
-            counts.clear += count;
-            return;
-        }
-        if early.is_some_and(|table| table.hides(&reach, nearest)) {
-            counts.hidden += count;
-            return;
-        }
-        self.place(frame, cluster);
-        self.choose(frame, cluster, &reach, early, counts);
-        let mut top = reach.low[1];
-        while top < reach.high[1] {
-            let mut left = reach.low[0];
-            while left < reach.high[0] {
-                let tile = Rect { low: [left, top], high: [left + TILE, top + TILE] }.meet(&reach);
-                self.convert(frame, cluster, &tile, counts, done);
-                left += TILE;
-            }
-            top += TILE;
-        }
-    }
-
-    /// Decides which tetrahedra of a cluster are scan-converted.
-    #[inline(always)]
-    fn choose(
-        &mut self,
-        frame: &Frame<'_>,
-        cluster: usize,
-        reach: &Rect,
-        early: Option<&early::Table>,
-        counts: &mut Counts,
-    ) {
-        self.shown.clear();
-        let of_points = frame.scalars.place() == Place::Points;
-        let raw = frame.scalars.of(cluster);
-        for (index, tetrahedron) in frame.clusters.tetrahedra(cluster).iter().enumerate() {
-            let corners = tetrahedron.map(|v| &self.corners[v as usize]);
-            let values = if of_points { tetrahedron.map(|v| raw[v as usize]) } else { [raw[index]; 4] };
-            let sum: f64 = corners.iter().map(|c| c.x + c.y + c.z).sum::<f64>() + values.iter().sum::<f64>();
-            if !sum.is_finite() {
-                counts.not_finite += 1;
-                continue;
-            }
-            let [mut low, mut high, mut nearest, mut farthest] =
-                [values[0], values[0], corners[0].z, corners[0].z];
-            for i in 1..4 {
-                (low, high) = (low.min(values[i]), high.max(values[i]));
-                (nearest, farthest) = (nearest.min(corners[i].z), farthest.max(corners[i].z));
-            }
-            if frame.skip_clear && frame.table.is_clear([low, high]) {
-                counts.clear += 1;
-                continue;
-            }
-            let mine = Rect::around(corners, reach);
-            if mine.is_empty() || farthest <= 0.0 {
-                counts.outside += 1;
-                continue;
-            }
-            if early.is_some_and(|table| table.hides(&mine, nearest)) {
-                counts.hidden += 1;
-                continue;
-            }
-            counts.scanned += 1;
-            self.shown.push(Shown { tetrahedron: index as u32, reach: mine, depth: nearest + farthest });
-        }
-        self.put_in_order();
-    }
-
-    /// Puts what is chosen roughly in order of depth: most stretches then go on where the one before ended.
-    #[inline(always)]
-    fn put_in_order(&mut self) {
-        let Some(&any) = self.shown.first() else { return };
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for shown in &self.shown {
-            (low, high) = (low.min(shown.depth), high.max(shown.depth));
-        }
-        let scale = if high > low { STEPS as f64 / (high - low) } else { 0.0 };
-        let step = |shown: &Shown| (((shown.depth - low) * scale) as usize).min(STEPS - 1);
-        let mut begins = [0_u32; STEPS];
-        for shown in &self.shown {
-            begins[step(shown)] += 1;
-        }
-        let mut begin = 0;
-        for count in &mut begins {
-            (*count, begin) = (begin, begin + *count);
-        }
-        self.nearest_first.clear();
-        self.nearest_first.resize(self.shown.len(), any);
-        for shown in &self.shown {
-            let place = &mut begins[step(shown)];
-            self.nearest_first[*place as usize] = *shown;
-            *place += 1;
-        }
-        std::mem::swap(&mut self.shown, &mut self.nearest_first);
-    }
-
     /// Scan-converts what is chosen, in one tile, and merges it.
     #[inline(always)]
-    fn convert(
+    fn convert<F: Four>(
         &mut self,
         frame: &Frame<'_>,
-        cluster: usize,
-        tile: &Rect,
+        of: Cluster<'_>,
+        [rect, tile]: [&Rect; 2],
         counts: &mut Counts,
         done: &mut impl FnMut(usize, Segment),
     ) {
@@ -363,8 +257,7 @@ impl Projector {
         }
         self.aside.clear();
         let (open, aside) = (&mut self.open, &mut self.aside);
-        let constants = (frame.scalars.place() == Place::Cells).then_some(&self.values[..]);
-        let tetrahedra = frame.clusters.tetrahedra(cluster);
+        let tetrahedra = frame.clusters.tetrahedra(of.cluster);
         let mut go_on = |raws: &[Raw], constant: Option<f32>| {
             counts.segments += raws.len() as u64;
             go_on(frame, raws, constant, open, aside);
@@ -372,9 +265,9 @@ impl Projector {
         for shown in &self.shown {
             let reach = shown.reach.meet(tile);
             let index = shown.tetrahedron as usize;
-            let corners = tetrahedra[index].map(|v| &self.corners[v as usize]);
-            let constant = constants.map(|values| values[index] as f32);
-            scan(corners, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut |raws| go_on(raws, constant));
+            let corners = tetrahedra[index].map(|v| &of.view.corners[v as usize]);
+            let constant = of.view.constants.get(index).copied();
+            scan::<F>(corners, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut |raws| go_on(raws, constant));
             if constant.is_some() {
                 go_on(self.gathered.take(), constant);
             }
@@ -383,15 +276,15 @@ impl Projector {
         let [across, _] = tile.size();
         let mut mixed = false;
         for (y, row) in (tile.low[1]..).zip(self.open.chunks_exact_mut(across)) {
-            let first = y as usize * frame.size[0] as usize;
-            for (x, open) in (tile.low[0]..).zip(row) {
+            let first = rect.number([tile.low[0], y]);
+            for (x, open) in row.iter_mut().enumerate() {
                 if open.run.back < 0.0 {
                     continue;
                 }
                 let mut done = |run: Segment| {
                     if run.rgba[3] > 0.0 {
                         counts.runs += 1;
-                        done(first + x as usize, run);
+                        done(first + x, run);
                     }
                 };
                 if open.aside == NONE {
@@ -414,44 +307,44 @@ impl Projector {
         }
         if mixed {
             let open = std::mem::take(&mut self.open);
-            self.one_by_one(frame, cluster, tile, &open, counts, done);
+            self.one_by_one::<F>(frame, of, [rect, tile], &open, counts, done);
             self.open = open;
         }
     }
 
     /// Appends the stretches of what is chosen; of the mixed pixels of `only`, if given.
     #[inline(always)]
-    fn collect(&mut self, frame: &Frame<'_>, cluster: usize, tile: &Rect, only: Option<&[Open]>) {
-        let tetrahedra = frame.clusters.tetrahedra(cluster);
-        let constant = frame.scalars.place() == Place::Cells;
+    fn collect<F: Four>(&mut self, frame: &Frame<'_>, of: Cluster<'_>, tile: &Rect, only: Option<&[Open]>) {
+        let tetrahedra = frame.clusters.tetrahedra(of.cluster);
         for shown in &self.shown {
             let reach = shown.reach.meet(tile);
             let index = shown.tetrahedron as usize;
-            let corners = tetrahedra[index].map(|v| &self.corners[v as usize]);
+            let corners = tetrahedra[index].map(|v| &of.view.corners[v as usize]);
+            let constant = of.view.constants.get(index);
             let (totals, raws) = (&mut self.counts, &mut self.raws);
             let mut keep = |found: &[Raw]| {
                 for &(mut raw) in found {
                     if only.is_none_or(|open| open[raw.pixel as usize].aside == MIXED) {
                         totals[raw.pixel as usize] += 1;
-                        if constant {
-                            raw.values = [self.values[index] as f32; 2];
+                        if let Some(&value) = constant {
+                            raw.values = [value; 2];
                         }
                         raws.push(raw);
                     }
                 }
             };
-            scan(corners, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut keep);
+            scan::<F>(corners, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut keep);
             keep(self.gathered.take());
         }
     }
 
     /// The same for the mixed pixels, with all their stretches put in order before they are integrated.
     #[inline(never)]
-    fn one_by_one(
+    fn one_by_one<F: Four>(
         &mut self,
         frame: &Frame<'_>,
-        cluster: usize,
-        tile: &Rect,
+        of: Cluster<'_>,
+        [rect, tile]: [&Rect; 2],
         open: &[Open],
         counts: &mut Counts,
         done: &mut impl FnMut(usize, Segment),
@@ -459,7 +352,7 @@ impl Projector {
         self.counts.clear();
         self.counts.resize(tile.area(), 0);
         self.raws.clear();
-        self.collect(frame, cluster, tile, Some(open));
+        self.collect::<F>(frame, of, tile, Some(open));
         if self.raws.is_empty() {
             return;
         }
@@ -467,18 +360,18 @@ impl Projector {
         let [across, _] = tile.size();
         let mut from = 0;
         for (y, row) in (tile.low[1]..).zip(self.counts.chunks_exact(across)) {
-            let first = y as usize * frame.size[0] as usize;
-            for (x, &to) in (tile.low[0]..).zip(row) {
+            let first = rect.number([tile.low[0], y]);
+            for (x, &to) in row.iter().enumerate() {
                 let to = to as usize;
                 if to == from {
                     continue;
                 }
-                let pixel = first + x as usize;
+                let at = [tile.low[0] + x as i32, y];
                 let raws = &mut self.ordered[from..to];
                 from = to;
                 sort(raws);
                 self.spans.clear();
-                integrate(raws, frame.table, frame.lens.stretch([x, y]), &mut self.spans);
+                integrate(raws, frame.table, frame.lens.stretch(at), &mut self.spans);
                 if overlap(&self.spans) {
                     counts.overlaps += 1;
                     add_up(&mut self.spans);
@@ -486,7 +379,7 @@ impl Projector {
                 merge(&self.spans, |run| {
                     if run.rgba[3] > 0.0 {
                         counts.runs += 1;
-                        done(pixel, run);
+                        done(first + x, run);
                     }
                 });
             }

@@ -13,10 +13,11 @@
 
 use super::clusters::Pack;
 use super::early::{self, Early};
-use super::fold::{Segment, add_up, merge, overlap, under};
+use super::fold::{Segment, composite};
+use super::in_view::{InView, Shown};
 use super::link::{Link, LinkError};
 use super::lists::Lists;
-use super::project::{Frame, Projector};
+use super::project::{Cluster, Frame, Projector};
 use super::stats::Counts;
 use super::wire::Message;
 
@@ -90,6 +91,10 @@ pub(super) struct Worker<'a, L> {
     lists: Lists,
     table: Option<early::Table>,
     projector: Projector,
+    view: InView,
+    scratch: Vec<Shown>,
+    /// Runs of a cluster, which with early termination cannot be taken while it is drawn.
+    runs: Vec<(usize, Segment)>,
     phase: Phase,
     /// Cells done since the table was brought up to date.
     since: u64,
@@ -103,6 +108,15 @@ pub(super) struct Worker<'a, L> {
     came: u64,
     ended: usize,
     gathered: Gathered,
+}
+
+impl Row {
+    /// Adds what stands to the right of it.
+    pub(super) fn append(&mut self, more: Self) {
+        self.colors.extend(more.colors);
+        self.counts.extend(more.counts);
+        self.segments.extend(more.segments);
+    }
 }
 
 impl<'a, L: Link> Worker<'a, L> {
@@ -119,8 +133,11 @@ impl<'a, L: Link> Worker<'a, L> {
             told: queue.len() as u32,
             queue,
             lists: Lists::new(width * height),
-            table: manner.early.map(|_| early::Table::new(frame.size, manner.side)),
+            table: manner.early.map(|_| early::Table::new(&frame.rect(), manner.side)),
             projector: Projector::default(),
+            view: InView::default(),
+            scratch: Vec::new(),
+            runs: Vec::new(),
             phase: Phase::Cells,
             since: 0,
             left,
@@ -339,15 +356,32 @@ impl<'a, L: Link> Worker<'a, L> {
         let rank = self.link.rank();
         let counts = &mut self.gathered.counts[rank];
         counts.clusters += 1;
-        let lists = &mut self.lists;
+        let frame = self.frame;
+        let count = frame.clusters.count(cluster) as u64;
+        let (reach, nearest) = frame.reach(cluster);
+        if reach.is_empty() {
+            counts.outside += count;
+            return;
+        }
+        if frame.skip_clear && frame.table.is_clear(frame.scalars.range(cluster)) {
+            counts.clear += count;
+            return;
+        }
+        if self.table.as_ref().is_some_and(|table| table.hides(&reach, nearest)) {
+            counts.hidden += count;
+            return;
+        }
+        self.view.fill(frame, cluster, &mut self.scratch, counts);
+        let of = Cluster { cluster, view: &self.view };
+        let (lists, picture) = (&mut self.lists, frame.rect());
         let Some((table, early)) = self.table.as_mut().zip(self.manner.early) else {
-            self.projector.draw(self.frame, cluster, None, counts, |pixel, run| lists.add(pixel, run));
+            self.projector.draw(frame, of, &picture, None, counts, |pixel, run| lists.add(pixel, run));
             return;
         };
-        let mut runs = std::mem::take(&mut self.projector.runs);
-        runs.clear();
-        self.projector.draw(self.frame, cluster, Some(table), counts, |pixel, run| runs.push((pixel, run)));
-        for &(pixel, run) in &runs {
+        self.runs.clear();
+        let runs = &mut self.runs;
+        self.projector.draw(frame, of, &picture, Some(table), counts, |pixel, run| runs.push((pixel, run)));
+        for &(pixel, run) in &self.runs {
             if run.front >= table.pixel(pixel) {
                 counts.merged += 1;
                 continue;
@@ -357,7 +391,6 @@ impl<'a, L: Link> Worker<'a, L> {
                 table.terminate(pixel, depth);
             }
         }
-        self.projector.runs = runs;
     }
 
     /// Brings the table of subscreens up to date from time to time, and shares what is new.
@@ -452,29 +485,14 @@ impl<'a, L: Link> Worker<'a, L> {
     /// Composites a row.
     fn row(&mut self, y: usize) -> Row {
         let width = self.frame.size[0] as usize;
-        let mut row = Row { colors: vec![[0.0; 4]; width], ..Row::default() };
+        let mut row = Row::default();
         let mut list: Vec<Segment> = Vec::new();
-        for (x, color) in row.colors.iter_mut().enumerate() {
-            let pixel = y * width + x;
-            list.clear();
-            list.extend(self.lists.pixel(pixel));
-            // The nearest clusters came first, and lists begin with what came last.
-            list.reverse();
-            list.sort_unstable_by(Segment::order);
-            if overlap(&list) {
-                self.count().overlapping_pixels += 1;
-                add_up(&mut list);
-            }
-            let before = row.segments.len();
-            merge(&list, |run| {
-                under(color, run.rgba);
-                if self.manner.keep {
-                    row.segments.push(run);
-                }
-            });
-            if self.manner.keep {
-                row.counts.push((row.segments.len() - before) as u32);
-            }
+        let rank = self.link.rank();
+        let counts = &mut self.gathered.counts[rank];
+        for pixel in y * width..(y + 1) * width {
+            let kept = self.manner.keep.then_some(&mut row);
+            let color = composite(&self.lists, pixel, &mut list, kept, counts);
+            row.colors.push(color);
         }
         row
     }

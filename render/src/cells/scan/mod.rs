@@ -9,16 +9,12 @@
 mod planes;
 mod sides;
 
-use planes::Cell;
+use crate::simd::Four;
+use planes::{Cell, Passed};
 use sides::Sides;
 
 /// Pixels that go at once.
 const LANES: usize = 4;
-
-/// One of each pixel of a group, where no access of memory straddles two lines of a cache.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(32))]
-struct Lanes<T>([T; LANES]);
 
 /// A corner before the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,6 +49,21 @@ impl Rect {
             low: [0, 1].map(|a| self.low[a].max(other.low[a])),
             high: [0, 1].map(|a| self.high[a].min(other.high[a])),
         }
+    }
+
+    /// The least that has all of both.
+    #[inline(always)]
+    pub(super) fn join(&self, other: &Self) -> Self {
+        Self {
+            low: [0, 1].map(|a| self.low[a].min(other.low[a])),
+            high: [0, 1].map(|a| self.high[a].max(other.high[a])),
+        }
+    }
+
+    /// Which of its pixels one is, row by row.
+    #[inline(always)]
+    pub(super) fn number(&self, [i, j]: [i32; 2]) -> usize {
+        (j - self.low[1]) as usize * self.size()[0] + (i - self.low[0]) as usize
     }
 
     pub(super) fn size(&self) -> [usize; 2] {
@@ -124,15 +135,16 @@ impl Raws {
         &self.list[..std::mem::take(&mut self.count)]
     }
 
-    /// Adds what the rays of a group pass, of those that pass it.
+    /// Adds what those rays of a group pass that do.
     #[inline(always)]
-    fn add_all(&mut self, first: u32, lanes: usize, hit: &Lanes<u64>, depths: &[Lanes<f64>; 2], values: &[Lanes<f64>; 2]) {
+    fn add_all<F: Four>(&mut self, first: u32, passed: &Passed<F>, hit: u32) {
+        let [fronts, backs] = passed.depths.map(F::to_array);
+        let [from, to] = passed.values.map(F::to_f32);
         for lane in 0..LANES {
-            let of = |of: &[Lanes<f64>; 2]| [of[0].0[lane], of[1].0[lane]];
-            let [front, back] = of(depths);
-            let values = of(values).map(|v| v as f32);
-            self.list[self.count] = Raw { front, back, values, pixel: first + lane as u32 };
-            self.count += usize::from(lane < lanes) & hit.0[lane] as usize;
+            let values = [from[lane], to[lane]];
+            self.list[self.count] =
+                Raw { front: fronts[lane], back: backs[lane], values, pixel: first + lane as u32 };
+            self.count += (hit >> lane & 1) as usize;
         }
     }
 
@@ -155,7 +167,7 @@ impl Raws {
 /// Finds what the rays of `reach`, which lies within `rect`, have of a tetrahedron. Its corners stand in the order of their
 /// numbers. Pixels are counted in `rect`. Whenever much is gathered it goes to `full`; what is left stays in `raws`.
 #[inline(always)]
-pub(super) fn scan(
+pub(super) fn scan<F: Four>(
     corners: [&Corner; 4],
     rects: [&Rect; 2],
     perspective: bool,
@@ -163,23 +175,23 @@ pub(super) fn scan(
     full: &mut impl FnMut(&[Raw]),
 ) {
     let corners = &corners;
-    let Some(cell) = Cell::new(corners, perspective) else {
+    let Some(cell) = Cell::new::<F>(corners, perspective) else {
         flat(corners, rects, perspective, raws, full);
         return;
     };
     match (cell.near, perspective) {
-        (1, false) => clear::<1, false>(&cell, corners, rects, raws, full),
-        (2, false) => clear::<2, false>(&cell, corners, rects, raws, full),
-        (_, false) => clear::<3, false>(&cell, corners, rects, raws, full),
-        (1, true) => clear::<1, true>(&cell, corners, rects, raws, full),
-        (2, true) => clear::<2, true>(&cell, corners, rects, raws, full),
-        (_, true) => clear::<3, true>(&cell, corners, rects, raws, full),
+        (1, false) => plain::<F, 1, false>(&cell, corners, rects, raws, full),
+        (2, false) => plain::<F, 2, false>(&cell, corners, rects, raws, full),
+        (_, false) => plain::<F, 3, false>(&cell, corners, rects, raws, full),
+        (1, true) => plain::<F, 1, true>(&cell, corners, rects, raws, full),
+        (2, true) => plain::<F, 2, true>(&cell, corners, rects, raws, full),
+        (_, true) => plain::<F, 3, true>(&cell, corners, rects, raws, full),
     }
 }
 
 /// The same of a cell that has planes, `NEAR` of them near.
 #[inline(always)]
-fn clear<const NEAR: usize, const PERSPECTIVE: bool>(
+fn plain<F: Four, const NEAR: usize, const PERSPECTIVE: bool>(
     cell: &Cell,
     corners: &[&Corner; 4],
     [rect, reach]: [&Rect; 2],
@@ -192,13 +204,14 @@ fn clear<const NEAR: usize, const PERSPECTIVE: bool>(
         let row = cell.row(j);
         let mut i = reach.low[0];
         while i < reach.high[0] {
-            let passed = cell.pass::<NEAR, PERSPECTIVE>(&row, i);
             let lanes = LANES.min((reach.high[0] - i) as usize);
+            let within = (1 << lanes) - 1;
+            let passed = cell.pass::<F, NEAR, PERSPECTIVE>(&row, i);
             let first = (before + i) as u32;
-            if passed.clear.0 == [u64::MAX; LANES] {
-                raws.add_all(first, lanes, &passed.hit, &passed.depths, &passed.values);
+            if passed.clear & within == within {
+                raws.add_all(first, &passed, passed.hit & within);
             } else {
-                Sides::new(corners, PERSPECTIVE).pass([i, j], first, lanes, raws);
+                unsure(corners, [i, j], first, lanes, PERSPECTIVE, raws);
             }
             if raws.count >= GATHERED {
                 full(raws.take());
@@ -208,7 +221,21 @@ fn clear<const NEAR: usize, const PERSPECTIVE: bool>(
     }
 }
 
-/// The same of a cell without planes.
+/// A group of rays of which some pass close to an edge.
+#[cold]
+#[inline(never)]
+fn unsure(
+    corners: &[&Corner; 4],
+    at: [i32; 2],
+    first: u32,
+    lanes: usize,
+    perspective: bool,
+    raws: &mut Raws,
+) {
+    Sides::new(corners, perspective).pass(at, first, lanes, raws);
+}
+
+/// What `scan` finds, of a cell without planes.
 #[inline(never)]
 fn flat(
     corners: &[&Corner; 4],

@@ -10,7 +10,8 @@
 //! them, the ray is left to exact predicates (`sides`). So is a cell that is too flat to have such planes.
 
 use super::Corner;
-use super::{FACES, LANES, Lanes};
+use super::FACES;
+use crate::simd::{Four, Plain};
 
 /// Roundings, of which an error is made up at most, in units in the last place.
 const ROUNDINGS: f64 = 32.0 * f64::EPSILON;
@@ -18,8 +19,12 @@ const ROUNDINGS: f64 = 32.0 * f64::EPSILON;
 const CANCELLED: f64 = 1e-10;
 /// A face seen narrower than that is steep: pixels.
 const NARROW: f64 = 1e-6;
-/// A tetrahedron that fills less of the box of its corners is flat.
-const FLAT: f64 = 1e-6;
+/// A tetrahedron that fills less of the box of its edges is flat.
+const FLAT: f64 = 1e-7;
+/// All four faces.
+const ALL: u32 = 0b1111;
+/// The first and third face: of a positive tetrahedron, a normal by the right hand there points away from the corner across.
+const EVEN: u32 = 0b0101;
 
 /// The planes of four faces, each of the corners that [`FACES`] has. Rank at a pixel (i, j) is (c + b·j) + a·i.
 #[derive(Debug, Clone, Copy)]
@@ -27,16 +32,25 @@ pub(super) struct Planes {
     a: [f64; 4],
     b: [f64; 4],
     c: [f64; 4],
-    /// Whether the face is seen from aside enough to have one.
-    pub(super) known: [bool; 4],
+    /// Which faces are seen from aside enough to have one, a bit each.
+    known: u32,
 }
 
 impl Planes {
-    /// Rank at lanes from `i` on of a row.
     #[inline(always)]
-    pub(super) fn rank(&self, face: usize, [i, j]: [i32; 2]) -> Lanes<f64> {
-        let row = self.c[face] + self.b[face] * f64::from(j);
-        Lanes(std::array::from_fn(|lane| row + self.a[face] * f64::from(i + lane as i32)))
+    pub(super) fn new(corners: &[&Corner; 4]) -> Self {
+        Faces::<Plain>::new(corners).planes()
+    }
+
+    #[inline(always)]
+    pub(super) fn known(&self, face: usize) -> bool {
+        self.known >> face & 1 == 1
+    }
+
+    /// Rank at a pixel.
+    #[inline(always)]
+    pub(super) fn rank(&self, face: usize, [i, j]: [i32; 2]) -> f64 {
+        (self.c[face] + self.b[face] * f64::from(j)) + self.a[face] * f64::from(i)
     }
 }
 
@@ -46,62 +60,81 @@ pub(super) fn depth(rank: f64, perspective: bool) -> f64 {
     if perspective { -1.0 / rank } else { rank }
 }
 
-/// Vectors along each axis: right, down and in rank.
-type Vectors = [[f64; 4]; 3];
-
-#[inline(always)]
-fn each(of: impl Fn(usize) -> f64) -> [f64; 4] {
-    std::array::from_fn(of)
+/// Planes of the faces with what they are worked out from: one of each face, or of each corner.
+struct Faces<F> {
+    /// Right, down and in rank, of each corner.
+    places: [F; 3],
+    a: F,
+    b: F,
+    c: F,
+    /// Normals along each axis.
+    normal: [F; 3],
+    /// What the two products that make up each come to without regard to sign.
+    size: [F; 3],
+    /// Minus one over how much the normals point in rank.
+    part: F,
+    known: u32,
 }
 
-/// Planes of the faces with what they are worked out from.
-struct Faces {
-    planes: Planes,
-    /// Normals.
-    normal: Vectors,
-    /// What the products that make up a normal add up to without regard to sign.
-    size: Vectors,
-    corners: Vectors,
-}
-
-impl Faces {
+impl<F: Four> Faces<F> {
     #[inline(always)]
     fn new(corners: &[&Corner; 4]) -> Self {
-        let places = [each(|v| corners[v].x), each(|v| corners[v].y), each(|v| corners[v].rank)];
-        let of = |corner: usize| places.map(|axis| each(|face| axis[FACES[face].0[corner]]));
-        let [first, second, third] = [of(0), of(1), of(2)];
-        let along = |to: &Vectors| -> Vectors { std::array::from_fn(|x| each(|f| to[x][f] - first[x][f])) };
-        let (u, v) = (along(&second), along(&third));
-        let (mut normal, mut size) = ([[0.0; 4]; 3], [[0.0; 4]; 3]);
-        for x in 0..3 {
-            let (y, z) = ((x + 1) % 3, (x + 2) % 3);
-            for f in 0..4 {
-                let (p, q) = (u[y][f] * v[z][f], u[z][f] * v[y][f]);
-                normal[x][f] = p - q;
-                size[x][f] = p.abs() + q.abs();
-            }
-        }
-        let [nx, ny, nz] = &normal;
-        let part = each(|f| -1.0 / nz[f]);
-        let (a, b) = (each(|f| nx[f] * part[f]), each(|f| ny[f] * part[f]));
-        let c = each(|f| (first[2][f] - a[f] * first[0][f]) - b[f] * first[1][f]);
-        let known = std::array::from_fn(|f| {
-            let deep = u[2][f].abs() + v[2][f].abs();
-            (nx[f].abs() + ny[f].abs()) * NARROW <= nz[f].abs() * deep && nz[f].abs() > CANCELLED * size[2][f]
-        });
-        Self { planes: Planes { a, b, c, known }, normal, size, corners: places }
+        let [p, q, r, s] = corners;
+        let x = F::from_array([p.x, q.x, r.x, s.x]);
+        let y = F::from_array([p.y, q.y, r.y, s.y]);
+        let z = F::from_array([p.rank, q.rank, r.rank, s.rank]);
+        // From the first corner of each face to its second and third, as `FACES` has them.
+        let u = [second(x) - first(x), second(y) - first(y), second(z) - first(z)];
+        let v = [third(x) - first(x), third(y) - first(y), third(z) - first(z)];
+        let (nx, size_x) = cross([u[1], u[2]], [v[1], v[2]]);
+        let (ny, size_y) = cross([u[2], u[0]], [v[2], v[0]]);
+        let (nz, size_z) = cross([u[0], u[1]], [v[0], v[1]]);
+        let part = (F::all(0.0) - nz).inverse();
+        let (a, b) = (nx * part, ny * part);
+        let c = (first(z) - a * first(x)) - b * first(y);
+        let (deep, length) = (u[2].abs() + v[2].abs(), nx.abs() + ny.abs());
+        let narrow = (nz.abs() * deep).below(length * F::all(NARROW));
+        // Where a corner has no rank, c is not a number.
+        let known = (size_z * F::all(CANCELLED)).below(nz.abs()) & c.abs().below(F::all(f64::INFINITY)) & !narrow;
+        let (normal, size) = ([nx, ny, nz], [size_x, size_y, size_z]);
+        Self { places: [x, y, z], a, b, c, normal, size, part, known }
+    }
+
+    #[inline(always)]
+    fn planes(&self) -> Planes {
+        Planes { a: self.a.to_array(), b: self.b.to_array(), c: self.c.to_array(), known: self.known }
     }
 }
 
-/// The planes of the faces of a tetrahedron, in the order of [`FACES`].
-pub(super) fn of(corners: &[&Corner; 4]) -> Planes {
-    Faces::new(corners).planes
+/// Of each face of [`FACES`], what its first corner has.
+#[inline(always)]
+fn first<F: Four>(of: F) -> F {
+    of.picked::<0b00_00_00_01>()
+}
+
+/// The same of its second.
+#[inline(always)]
+fn second<F: Four>(of: F) -> F {
+    of.picked::<0b01_01_10_10>()
+}
+
+/// The same of its third.
+#[inline(always)]
+fn third<F: Four>(of: F) -> F {
+    of.picked::<0b10_11_11_11>()
+}
+
+/// A component of the cross product of two vectors, and what its products come to without regard to sign.
+#[inline(always)]
+fn cross<F: Four>(u: [F; 2], v: [F; 2]) -> (F, F) {
+    let (p, q) = (u[0] * v[1], u[1] * v[0]);
+    (p - q, p.abs() + q.abs())
 }
 
 /// Faces with the near ones first, by which are near, a bit each.
-const ORDERS: [[usize; 4]; 16] = orders();
+const ORDERS: [[u8; 4]; 16] = orders();
 
-const fn orders() -> [[usize; 4]; 16] {
+const fn orders() -> [[u8; 4]; 16] {
     let mut orders = [[0; 4]; 16];
     let mut code = 0;
     while code < 16 {
@@ -144,128 +177,114 @@ pub(super) struct Cell {
 impl Cell {
     /// None for one that is too flat, that is not wholly before the eye, or that has no sides that could be told.
     #[inline(always)]
-    pub(super) fn new(corners: &[&Corner; 4], perspective: bool) -> Option<Self> {
-        let faces = Faces::new(corners);
-        let Faces { planes, normal, size, corners: places } = &faces;
-        let spread = places.map(|axis| {
-            let most = axis[0].max(axis[1]).max(axis[2].max(axis[3]));
-            most - axis[0].min(axis[1]).min(axis[2].min(axis[3]))
-        });
-        let far = [0, 1].map(|x| places[x].iter().fold(0.0, |far: f64, v| far.max(v.abs())));
-        let edge = |corner: usize, x: usize| places[x][corner] - places[x][0];
-        let volume = (edge(1, 0) * normal[0][1] + edge(1, 1) * normal[1][1]) + edge(1, 2) * normal[2][1];
-        let before = corners.iter().all(|c| c.z >= 0.0);
+    pub(super) fn new<F: Four>(corners: &[&Corner; 4], perspective: bool) -> Option<Self> {
+        let faces = Faces::<F>::new(corners);
+        let [x, y, z] = faces.places.map(F::to_array);
+        let [nx, ny, nz] = faces.normal.map(F::to_array);
+        let volume = ((x[1] - x[0]) * nx[1] + (y[1] - y[0]) * ny[1]) + (z[1] - z[0]) * nz[1];
+        let spread = [spread(x), spread(y), spread(z)];
+        let before = (corners[0].z >= 0.0) & (corners[1].z >= 0.0) & (corners[2].z >= 0.0) & (corners[3].z >= 0.0);
         // Written so that what is not a number is not plain.
-        let full = volume.abs() >= FLAT * (spread[0] * spread[1] * spread[2]) && volume.is_finite();
-        if !(before && full) {
+        let full = (volume.abs() >= FLAT * (spread[0] * spread[1] * spread[2])) & volume.is_finite();
+        if !(before & full) {
             return None;
         }
-        let mut code = 0;
-        for face in 0..4 {
-            let turned = (face % 2 == 0) ^ (volume < 0.0);
-            code |= usize::from((normal[2][face] > 0.0) ^ turned) << face;
-        }
+        let turned = if volume < 0.0 { ALL & !EVEN } else { EVEN };
+        let mut near = F::all(0.0).below(faces.normal[2]) ^ turned;
         // What rounding may have done to a plane over the cell.
-        let wrong = each(|f| {
-            let [a, b] = [planes.a[f].abs(), planes.b[f].abs()];
-            let normal = (size[0][f] + a * size[2][f]) * spread[0] + (size[1][f] + b * size[2][f]) * spread[1];
-            let place = (a * far[0] + b * far[1]) + planes.c[f].abs();
-            ROUNDINGS * (normal / faces.normal[2][f].abs() + place)
-        });
-        let sum = (wrong[0] + wrong[1]) + (wrong[2] + wrong[3]);
-        let mut unsure = [sum; 4];
-        let mut planes = *planes;
-        if planes.known != [true; 4] {
-            (code, unsure) = steep(&faces, volume, spread, &mut planes, wrong, code)?;
+        let (a, b) = (faces.a.abs(), faces.b.abs());
+        let normal = (faces.size[0] + a * faces.size[2]) * F::all(spread[0])
+            + (faces.size[1] + b * faces.size[2]) * F::all(spread[1]);
+        let place = a * F::all(x[0].abs() + spread[0]) + b * F::all(y[0].abs() + spread[1]);
+        let wrong = (normal * faces.part.abs() + (place + faces.c.abs())) * F::all(ROUNDINGS);
+        let wrong = wrong.to_array();
+        let mut unsure = [(wrong[0] + wrong[1]) + (wrong[2] + wrong[3]); 4];
+        let mut planes = faces.planes();
+        if planes.known != ALL {
+            let normal = [nx, ny, nz];
+            let size = faces.size.map(F::to_array);
+            (near, unsure) = steep(&mut planes, [[x, y, z], normal, size], [volume, spread[2]], wrong, near)?;
         }
-        let near = code.count_ones();
-        if near == 0 || near == 4 {
+        if near == 0 || near == ALL {
             return None;
         }
-        let order = ORDERS[code];
+        let order = ORDERS[near as usize & 15].map(|face| usize::from(face & 3));
         let pair = |one: usize, other: usize| unsure[order[one]].max(unsure[order[other]]);
-        let weight = |corner: usize| if perspective { -places[2][corner] } else { 1.0 };
+        let weight = |corner: usize| if perspective { -z[corner] } else { 1.0 };
         let rise = |corner: usize| (corners[corner].scalar - corners[0].scalar) * weight(corner);
         let [one, two, three] = [rise(1), rise(2), rise(3)];
         let part = 1.0 / volume;
-        let slope = [0, 1, 2].map(|x| ((one * normal[x][1] - two * normal[x][2]) + three * normal[x][3]) * part);
-        let at_first = -((slope[0] * places[0][0] + slope[1] * places[1][0]) + slope[2] * places[2][0]);
+        let slope = |n: &[f64; 4]| ((one * n[1] - two * n[2]) + three * n[3]) * part;
+        let [right, down, back] = [slope(&nx), slope(&ny), slope(&nz)];
+        let at_first = -((right * x[0] + down * y[0]) + back * z[0]);
+        let of = |v: &[f64; 4]| [v[order[0]], v[order[1]], v[order[2]], v[order[3]]];
         Some(Self {
-            a: order.map(|f| planes.a[f]),
-            b: order.map(|f| planes.b[f]),
-            c: order.map(|f| planes.c[f]),
-            near,
-            unsure: unsure[order[near as usize]],
+            a: of(&planes.a),
+            b: of(&planes.b),
+            c: of(&planes.c),
+            near: near.count_ones(),
+            unsure: unsure[order[3]],
             unsure_near: [pair(0, 1), pair(0, 2), pair(1, 2)],
             from: corners[0].scalar,
-            change: [at_first, slope[0], slope[1], slope[2]],
+            change: [at_first, right, down, back],
         })
     }
 
-    /// Where the rays of a group pass, `NEAR` of the faces being near.
+    /// What is one for all pixels of a row of the picture.
     #[inline(always)]
-    pub(super) fn pass<const NEAR: usize, const PERSPECTIVE: bool>(&self, row: &Row, i: i32) -> Passed {
-        let at: [f64; LANES] = std::array::from_fn(|lane| f64::from(i) + lane as f64);
-        let mut ranks = [Lanes([0.0; LANES]); 4];
+    pub(super) fn row(&self, j: i32) -> Row {
+        let y = f64::from(j);
+        let mut ranks = [0.0; 4];
         for (face, rank) in ranks.iter_mut().enumerate() {
-            for lane in 0..LANES {
-                rank.0[lane] = row.ranks[face] + self.a[face] * at[lane];
-            }
+            *rank = self.c[face] + self.b[face] * y;
         }
-        let mut enter = ranks[0];
-        let mut leave = ranks[NEAR];
-        let mut clear = Lanes([u64::MAX; LANES]);
-        let mut apart = |[one, other]: [usize; 2], unsure: f64| {
-            for lane in 0..LANES {
-                let apart = (ranks[one].0[lane] - ranks[other].0[lane]).abs();
-                clear.0[lane] &= if apart > unsure { u64::MAX } else { 0 };
-            }
-        };
+        Row { ranks, change: self.change[0] + self.change[2] * y }
+    }
+
+    /// Where the rays of the group from pixel i of a row on pass, `NEAR` of the faces being near.
+    #[inline(always)]
+    pub(super) fn pass<F: Four, const NEAR: usize, const PERSPECTIVE: bool>(&self, row: &Row, i: i32) -> Passed<F> {
+        let x = F::all(f64::from(i)) + F::from_array([0.0, 1.0, 2.0, 3.0]);
+        let rank = |face: usize| F::all(row.ranks[face]) + F::all(self.a[face]) * x;
+        let ranks = [rank(0), rank(1), rank(2), rank(3)];
+        let (mut enter, mut leave) = (ranks[0], ranks[NEAR]);
+        for rank in &ranks[1..NEAR] {
+            enter = enter.most(*rank);
+        }
+        for rank in &ranks[NEAR + 1..] {
+            leave = leave.least(*rank);
+        }
+        let inside = leave - enter;
+        // By how much all differences are beyond doubt.
+        let mut clear = inside.abs() - F::all(self.unsure);
         for one in 0..NEAR {
             for other in one + 1..NEAR {
-                apart([one, other], self.unsure_near[one + other - 1]);
+                let apart = (ranks[one] - ranks[other]).abs();
+                clear = clear.least(apart - F::all(self.unsure_near[one + other - 1]));
             }
         }
         for one in NEAR..4 {
             for other in one + 1..4 {
-                apart([one, other], self.unsure);
+                clear = clear.least((ranks[one] - ranks[other]).abs() - F::all(self.unsure));
             }
         }
-        for rank in &ranks[1..NEAR] {
-            for lane in 0..LANES {
-                enter.0[lane] = if rank.0[lane] > enter.0[lane] { rank.0[lane] } else { enter.0[lane] };
-            }
-        }
-        for rank in &ranks[NEAR + 1..] {
-            for lane in 0..LANES {
-                leave.0[lane] = if rank.0[lane] < leave.0[lane] { rank.0[lane] } else { leave.0[lane] };
-            }
-        }
-        let mut hit = Lanes([0; LANES]);
-        for lane in 0..LANES {
-            let inside = leave.0[lane] - enter.0[lane];
-            clear.0[lane] &= if inside.abs() > self.unsure { u64::MAX } else { 0 };
-            hit.0[lane] = if inside > 0.0 { clear.0[lane] } else { 0 };
-        }
-        let mut passed =
-            Passed { hit, clear, depths: [enter, leave], values: [Lanes([0.0; LANES]); 2] };
-        for (depth, value) in passed.depths.iter_mut().zip(&mut passed.values) {
-            for lane in 0..LANES {
-                let rank = depth.0[lane];
-                let change = (row.change + self.change[1] * at[lane]) + self.change[3] * rank;
-                depth.0[lane] = self::depth(rank, PERSPECTIVE);
-                let times = if PERSPECTIVE { depth.0[lane] } else { 1.0 };
-                value.0[lane] = self.from + change * times;
-            }
-        }
-        passed
+        let none = F::all(0.0);
+        let along = F::all(row.change) + F::all(self.change[1]) * x;
+        let depth = |rank: F| if PERSPECTIVE { (none - rank).inverse() } else { rank };
+        let value = |rank: F, depth: F| {
+            let change = along + F::all(self.change[3]) * rank;
+            F::all(self.from) + if PERSPECTIVE { change * depth } else { change }
+        };
+        let depths = [depth(enter), depth(leave)];
+        let values = [value(enter, depths[0]), value(leave, depths[1])];
+        Passed { hit: none.below(inside), clear: none.below(clear), depths, values }
     }
+}
 
-    #[inline(always)]
-    pub(super) fn row(&self, j: i32) -> Row {
-        let y = f64::from(j);
-        Row { ranks: each(|f| self.c[f] + self.b[f] * y), change: self.change[0] + self.change[2] * y }
-    }
+/// Not less than the least and greatest are apart.
+#[inline(always)]
+fn spread(v: [f64; 4]) -> f64 {
+    ((v[1] - v[0]).abs() + (v[2] - v[0]).abs()) + (v[3] - v[0]).abs()
 }
 
 /// What is one for all pixels of a row of the picture.
@@ -274,39 +293,37 @@ pub(super) struct Row {
     change: f64,
 }
 
-/// Where the rays of a group pass a cell; all bits set where it is so.
-pub(super) struct Passed {
-    pub(super) hit: Lanes<u64>,
-    /// Where not, exact predicates have to say.
-    pub(super) clear: Lanes<u64>,
+/// Where the rays of a group pass a cell.
+pub(super) struct Passed<F> {
+    /// Which do, and of which that is sure, a bit each; of the others exact predicates have to say.
+    pub(super) hit: u32,
+    pub(super) clear: u32,
     /// In and out.
-    pub(super) depths: [Lanes<f64>; 2],
-    pub(super) values: [Lanes<f64>; 2],
+    pub(super) depths: [F; 2],
+    pub(super) values: [F; 2],
 }
 
 /// Puts a plane that stands on the picture in the place of each face which is seen too much from aside to have one: it ends
 /// the cell to one side, and no ray that is told apart from it passes it. Gives which faces are near then, and what rounding
 /// may have done to each; none if that cannot be said.
+///
+/// `of` are the corners, the faces' normals, and the sizes of what made these up, along each axis; `extent` the cell's volume
+/// and its spread in rank.
 #[cold]
 #[inline(never)]
 fn steep(
-    faces: &Faces,
-    volume: f64,
-    spread: [f64; 3],
     planes: &mut Planes,
+    of: [[[f64; 4]; 3]; 3],
+    extent: [f64; 2],
     wrong: [f64; 4],
-    near: usize,
-) -> Option<(usize, [f64; 4])> {
-    let Faces { normal, size, corners, .. } = faces;
-    let (mut known, mut sum) = (0, 0.0);
-    for face in (0..4).filter(|&face| planes.known[face]) {
-        known |= 1 << face;
-        sum += wrong[face];
-    }
+    near: u32,
+) -> Option<(u32, [f64; 4])> {
+    let ([corners, normal, size], [volume, spread], known) = (of, extent, planes.known);
     // Something of both kinds has to be left to pass.
     if near & known == 0 || !near & known == 0 {
         return None;
     }
+    let sum = (0..4).filter(|face| known >> face & 1 == 1).fold(0.0, |sum, face| sum + wrong[face]);
     let (mut near, mut unsure) = (near & known, [sum; 4]);
     for face in (0..4).filter(|face| known >> face & 1 == 0) {
         let [nx, ny] = [normal[0][face], normal[1][face]];
@@ -315,14 +332,14 @@ fn steep(
             return None;
         }
         // Towards the corner across, rank falls by all that there is of it in the cell in what is too narrow to be seen.
-        let inward = if (face % 2 == 0) ^ (volume < 0.0) { -1.0 } else { 1.0 };
-        let fall = -inward * spread[2] / (NARROW * length);
+        let inward = if (EVEN >> face & 1 == 1) ^ (volume < 0.0) { -1.0 } else { 1.0 };
+        let fall = -inward * spread / (NARROW * length);
         let (a, b, first) = (fall * nx, fall * ny, FACES[face].0[0]);
         planes.a[face] = a;
         planes.b[face] = b;
         planes.c[face] = (corners[2][first] - a * corners[0][first]) - b * corners[1][first];
         near |= 1 << face;
-        unsure[face] = 4.0 * spread[2];
+        unsure[face] = 4.0 * spread;
     }
     Some((near, unsure))
 }

@@ -12,8 +12,13 @@
 
 use std::cmp::Ordering;
 
-use super::planes::{self, Planes, depth};
-use super::{Corner, FACES, LANES, Lanes, Raws};
+use super::planes::{Planes, depth};
+use super::{Corner, FACES, LANES, Raws};
+
+/// One of each pixel of a group, where no access of memory straddles two lines of a cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
+struct Lanes<T>([T; LANES]);
 
 /// Corners of an edge.
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
@@ -66,7 +71,7 @@ impl<'a> Sides<'a> {
             let [weight, depth] = if divided { [-c.rank, 1.0] } else { [1.0, c.z] };
             [weight, depth, c.scalar * weight]
         });
-        Self { corners, fields, planes: planes::of(corners), perspective }
+        Self { corners, fields, planes: Planes::new(corners), perspective }
     }
 
     /// Adds what the rays of the first `lanes` of a group from pixel (i, j) on pass; `first` is that pixel's number.
@@ -153,10 +158,10 @@ impl<'a> Sides<'a> {
                         weights[*corner].0[lane] |= passed[lane] & areas[*edge].0[lane].to_bits();
                     }
                 }
-                if self.planes.known[face] {
-                    let rank = self.planes.rank(face, at);
+                if self.planes.known(face) {
                     for lane in 0..LANES {
-                        ranks.0[lane] |= passed[lane] & rank.0[lane].to_bits();
+                        let rank = self.planes.rank(face, [at[0] + lane as i32, at[1]]);
+                        ranks.0[lane] |= passed[lane] & rank.to_bits();
                         known.0[lane] |= passed[lane];
                     }
                 }
@@ -198,8 +203,8 @@ impl<'a> Sides<'a> {
         } else {
             [p[1] / p[0], p[2] / p[0]]
         };
-        let on_plane = || depth(self.planes.rank(face, at).0[0], self.perspective);
-        [if self.planes.known[face] { on_plane() } else { z }, value]
+        let on_plane = || depth(self.planes.rank(face, at), self.perspective);
+        [if self.planes.known(face) { on_plane() } else { z }, value]
     }
 }
 

@@ -1,0 +1,207 @@
+//! The picture shared out among threads that have the whole grid at hand: each draws one block of pixels after another, with
+//! all cells before it. Nothing is exchanged, and what a block's rays have of the grid stays near the core. Cells that reach
+//! into several blocks are set up in each of them.
+//!
+//! Clusters are gone through, and runs of theirs composited, as workers do that share out the grid: the bytes are the same.
+//! Early termination is kept by each block for itself, with subscreens of its own.
+
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use super::early;
+use super::fold::{Segment, composite};
+use super::in_view::{InView, Shown};
+use super::lists::Lists;
+use super::project::{Cluster, Frame, Projector};
+use super::scan::Rect;
+use super::stats::Counts;
+use super::worker::{Gathered, Manner, Row};
+use super::{CellsError, MAX_WORKERS};
+
+/// Pixels that a block is wide and high.
+static BLOCKS: std::sync::LazyLock<usize> = std::sync::LazyLock::new(|| std::env::var("BLK").map_or(64, |v| v.parse().unwrap()));
+
+/// A cluster that may show.
+#[derive(Debug)]
+pub(super) struct Near {
+    pub(super) cluster: usize,
+    /// Pixels that it may show in.
+    pub(super) reach: Rect,
+    pub(super) view: InView,
+}
+
+impl Near {
+    pub(super) fn cluster(&self) -> Cluster<'_> {
+        Cluster { cluster: self.cluster, view: &self.view }
+    }
+}
+
+/// All clusters that may show, nearest first, and how many cells of the others cannot.
+pub(super) fn in_view(frame: &Frame<'_>) -> (Vec<Near>, Counts) {
+    let mut counts = Counts::default();
+    let mut shown = Vec::new();
+    for cluster in 0..frame.clusters.len() {
+        let (reach, nearest) = frame.reach(cluster);
+        let count = frame.clusters.count(cluster) as u64;
+        if reach.is_empty() {
+            counts.outside += count;
+        } else if frame.skip_clear && frame.table.is_clear(frame.scalars.range(cluster)) {
+            counts.clear += count;
+        } else {
+            // Bits of floats are in their order where they are not negative.
+            shown.push((nearest.max(0.0).to_bits(), cluster, reach));
+        }
+    }
+    shown.sort_unstable_by_key(|&(nearest, cluster, _)| (nearest, cluster));
+    let fill = |scratch: &mut Vec<Shown>, &(_, cluster, reach): &(u64, usize, Rect)| {
+        let (mut view, mut counts) = (InView::default(), Counts::default());
+        view.fill(frame, cluster, scratch, &mut counts);
+        (Near { cluster, reach, view }, counts)
+    };
+    let near: Vec<(Near, Counts)> = shown.par_iter().with_min_len(8).map_init(Vec::new, fill).collect();
+    let near = near.into_iter().map(|(near, more)| {
+        counts.add(more);
+        near
+    });
+    let near = near.collect();
+    (near, counts)
+}
+
+/// What a thread keeps from block to block.
+struct Desk<'a> {
+    frame: &'a Frame<'a>,
+    manner: Manner,
+    near: &'a [Near],
+    projector: Projector,
+    lists: Lists,
+    /// What comes through all that is known of each pixel, and how deep that reaches; with early termination only.
+    known: Vec<(f32, f64)>,
+    list: Vec<Segment>,
+    counts: Counts,
+}
+
+impl Desk<'_> {
+    /// Draws a block; `near` are places of clusters.
+    fn draw(&mut self, rect: &Rect, near: &[u32]) -> Vec<Row> {
+        let Self { frame, manner, projector, lists, known, counts, .. } = self;
+        let early = manner.early.map(|early| early.threshold as f32);
+        lists.reset(rect.area());
+        let [width, height] = rect.size();
+        let mut table = manner.early.map(|_| early::Table::new(rect, manner.side));
+        known.clear();
+        known.resize(if early.is_some() { rect.area() } else { 0 }, (1.0, 0.0));
+        for &place in near {
+            let of = &self.near[place as usize];
+            let mut stale = Vec::new();
+            projector.draw(frame, of.cluster(), rect, table.as_ref(), counts, |pixel, run| {
+                lists.add(pixel, run);
+                if let (Some(threshold), Some((through, reach))) = (early, known.get_mut(pixel)) {
+                    *through *= 1.0 - run.rgba[3];
+                    *reach = reach.max(run.back);
+                    if 1.0 - *through >= threshold {
+                        stale.push((pixel, *reach));
+                    }
+                }
+            });
+            if let Some(table) = table.as_mut().filter(|_| !stale.is_empty()) {
+                for (pixel, depth) in stale {
+                    table.terminate(pixel, depth);
+                }
+                table.refresh();
+            }
+        }
+        (0..height).map(|y| self.row(y * width, width)).collect()
+    }
+
+    /// Composites the pixels of a row of a block, which begins with `first`.
+    fn row(&mut self, first: usize, width: usize) -> Row {
+        let mut row = Row::default();
+        for pixel in first..first + width {
+            let color = composite(&self.lists, pixel, &mut self.list, self.manner.keep.then_some(&mut row), &mut self.counts);
+            row.colors.push(color);
+        }
+        row
+    }
+}
+
+/// Draws a picture with `workers` threads at most.
+pub(super) fn run(
+    frame: &Frame<'_>,
+    manner: Manner,
+    workers: usize,
+    progress: &(dyn Fn(usize, usize) -> bool + Sync),
+) -> Result<Gathered, CellsError> {
+    let [width, height] = frame.size.map(|n| n as usize);
+    let (near, skipped) = in_view(frame);
+    let across = width.div_ceil(*BLOCKS);
+    let mut blocks: Vec<(Rect, Vec<u32>)> = Vec::new();
+    for (y, x) in (0..height.div_ceil(*BLOCKS)).flat_map(|y| (0..across).map(move |x| (y, x))) {
+        let low = [x * *BLOCKS, y * *BLOCKS];
+        let high = [(low[0] + *BLOCKS).min(width), (low[1] + *BLOCKS).min(height)];
+        blocks.push((Rect { low: low.map(|v| v as i32), high: high.map(|v| v as i32) }, Vec::new()));
+    }
+    for (place, near) in near.iter().enumerate() {
+        let [x0, y0] = near.reach.low.map(|v| v as usize / *BLOCKS);
+        let [x1, y1] = near.reach.high.map(|v| (v as usize - 1) / *BLOCKS);
+        for (y, x) in (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| (y, x))) {
+            blocks[y * across + x].1.push(place as u32);
+        }
+    }
+    // Those with most to do first, so that no thread is left with a long one in the end.
+    let mut order: Vec<usize> = (0..blocks.len()).collect();
+    order.sort_by_key(|&block| std::cmp::Reverse(blocks[block].1.len()));
+    let next = AtomicUsize::new(0);
+    let cancelled = AtomicBool::new(false);
+    let drawn: Mutex<(Vec<(usize, Vec<Row>)>, Vec<Counts>)> = Mutex::default();
+    let work = || {
+        let mut desk = Desk {
+            frame,
+            manner,
+            near: &near,
+            projector: Projector::default(),
+            lists: Lists::new(*BLOCKS * *BLOCKS),
+            known: Vec::new(),
+            list: Vec::new(),
+            counts: Counts::default(),
+        };
+        let mut mine = Vec::new();
+        while let Some(&block) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let (rect, near) = &blocks[block];
+            mine.push((block, desk.draw(rect, near)));
+            if !progress(next.load(Ordering::Relaxed).min(order.len()), order.len()) {
+                cancelled.store(true, Ordering::Relaxed);
+            }
+            if cancelled.load(Ordering::Relaxed) {
+                return;
+            }
+        }
+        let mut drawn = drawn.lock().unwrap_or_else(PoisonError::into_inner);
+        drawn.0.extend(mine);
+        drawn.1.push(desk.counts);
+    };
+    rayon::scope(|scope| {
+        for _ in 0..workers.min(MAX_WORKERS) {
+            scope.spawn(|_| work());
+        }
+    });
+    if cancelled.into_inner() {
+        return Err(CellsError::Cancelled);
+    }
+    let (mut drawn, mut counts) = drawn.into_inner().unwrap_or_else(PoisonError::into_inner);
+    // Blocks of one row of them stand side by side.
+    drawn.sort_unstable_by_key(|&(block, _)| block);
+    let mut rows = vec![Row::default(); height];
+    for (block, part) in drawn {
+        let top = block / across * *BLOCKS;
+        for (row, more) in rows[top..].iter_mut().zip(part) {
+            row.append(more);
+        }
+    }
+    if let Some(first) = counts.first_mut() {
+        first.add(skipped);
+    }
+    Ok(Gathered { rows, counts })
+}
