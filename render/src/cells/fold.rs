@@ -179,16 +179,19 @@ pub(super) fn composite(
     mut kept: Option<&mut Row>,
     counts: &mut Counts,
 ) -> [f32; 4] {
-    let mut color = [0.0; 4];
     list.clear();
     list.extend(lists.pixel(pixel));
     // The nearest clusters came first, and lists begin with what came last.
     list.reverse();
-    list.sort_unstable_by(Segment::order);
+    // What comes one behind the other is in order.
     if overlap(list) {
-        counts.overlapping_pixels += 1;
-        add_up(list);
+        list.sort_unstable_by(Segment::order);
+        if overlap(list) {
+            counts.overlapping_pixels += 1;
+            add_up(list);
+        }
     }
+    let mut color = [0.0; 4];
     let mut runs = 0;
     merge(list, |run| {
         under(&mut color, run.rgba);
