@@ -34,8 +34,38 @@ pub(crate) trait Four:
     fn below(self, other: Self) -> u32;
     /// Each two bits of `ORDER` say which comes there, the lowest first.
     fn picked<const ORDER: i32>(self) -> Self;
-    /// Rounded to half as many bits.
-    fn to_f32(self) -> [f32; 4];
+    /// Writes those of which a bit is set one behind the other; what comes after them there is no matter.
+    fn put(self, which: u32, into: &mut [f64; 4]);
+    /// The same, rounded to half as many digits.
+    fn put_f32(self, which: u32, into: &mut [f32; 4]);
+}
+
+/// The same of the whole numbers from `first` on.
+#[inline(always)]
+pub(crate) fn put_from(first: u32, which: u32, into: &mut [u32; 4]) {
+    for (place, n) in into.iter_mut().zip(PACKED[(which & 15) as usize]) {
+        *place = first + n;
+    }
+}
+
+/// By the bits set, their numbers.
+const PACKED: [[u32; 4]; 16] = packed();
+
+const fn packed() -> [[u32; 4]; 16] {
+    let mut packed = [[0; 4]; 16];
+    let mut which = 0;
+    while which < 16 {
+        let (mut bit, mut count) = (0, 0);
+        while bit < 4 {
+            if which >> bit & 1 == 1 {
+                packed[which][count] = bit as u32;
+                count += 1;
+            }
+            bit += 1;
+        }
+        which += 1;
+    }
+    packed
 }
 
 /// By whatever instructions there are.
@@ -120,8 +150,17 @@ impl Four for Plain {
     }
 
     #[inline(always)]
-    fn to_f32(self) -> [f32; 4] {
-        self.0.map(|v| v as f32)
+    fn put(self, which: u32, into: &mut [f64; 4]) {
+        for (place, n) in into.iter_mut().zip(PACKED[(which & 15) as usize]) {
+            *place = self.0[n as usize];
+        }
+    }
+
+    #[inline(always)]
+    fn put_f32(self, which: u32, into: &mut [f32; 4]) {
+        for (place, n) in into.iter_mut().zip(PACKED[(which & 15) as usize]) {
+            *place = self.0[n as usize] as f32;
+        }
     }
 }
 
@@ -132,17 +171,36 @@ pub(crate) use wide::Wide;
 #[expect(unsafe_code, reason = "instructions that the machine has to be asked for")]
 mod wide {
     use std::arch::x86_64::{
-        __m256d, _mm_storeu_ps, _mm256_add_pd, _mm256_and_pd, _mm256_castsi256_pd, _mm256_cmp_pd, _mm256_cvtpd_ps,
-        _mm256_div_pd, _mm256_loadu_pd, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd,
-        _mm256_permute4x64_pd, _mm256_set1_epi64x, _mm256_set1_pd, _mm256_storeu_pd, _mm256_sub_pd, _CMP_LT_OQ,
+        __m256d, _CMP_LT_OQ, _mm_loadu_si128, _mm_permutevar_ps, _mm_storeu_ps, _mm256_add_pd, _mm256_and_pd,
+        _mm256_castpd_ps, _mm256_castps_pd, _mm256_castsi256_pd, _mm256_cmp_pd, _mm256_cvtpd_ps, _mm256_div_pd,
+        _mm256_loadu_pd, _mm256_loadu_si256, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd,
+        _mm256_permute4x64_pd, _mm256_permutevar8x32_ps, _mm256_set1_epi64x, _mm256_set1_pd, _mm256_storeu_pd,
+        _mm256_sub_pd,
     };
     use std::ops::{Add, Mul, Sub};
 
-    use super::Four;
+    use super::{Four, PACKED};
 
     /// By AVX2. Only code that is called where [`super::has_wide`] says yes names this type.
     #[derive(Debug, Clone, Copy)]
     pub(crate) struct Wide(__m256d);
+
+    /// [`PACKED`] for halves of numbers.
+    const PAIRS: [[u32; 8]; 16] = pairs();
+
+    const fn pairs() -> [[u32; 8]; 16] {
+        let mut pairs = [[0; 8]; 16];
+        let mut which = 0;
+        while which < 16 {
+            let mut n = 0;
+            while n < 8 {
+                pairs[which][n] = 2 * PACKED[which][n / 2] + n as u32 % 2;
+                n += 1;
+            }
+            which += 1;
+        }
+        pairs
+    }
 
     // SAFETY, of all below: this type is only named where the instructions were detected; loads and stores are of arrays as
     // long as a register.
@@ -220,10 +278,22 @@ mod wide {
         }
 
         #[inline(always)]
-        fn to_f32(self) -> [f32; 4] {
-            let mut v = [0.0; 4];
-            unsafe { _mm_storeu_ps(v.as_mut_ptr(), _mm256_cvtpd_ps(self.0)) };
-            v
+        fn put(self, which: u32, into: &mut [f64; 4]) {
+            let order = &PAIRS[(which & 15) as usize];
+            unsafe {
+                let order = _mm256_loadu_si256(order.as_ptr().cast());
+                let packed = _mm256_permutevar8x32_ps(_mm256_castpd_ps(self.0), order);
+                _mm256_storeu_pd(into.as_mut_ptr(), _mm256_castps_pd(packed));
+            }
+        }
+
+        #[inline(always)]
+        fn put_f32(self, which: u32, into: &mut [f32; 4]) {
+            let order = &PACKED[(which & 15) as usize];
+            unsafe {
+                let order = _mm_loadu_si128(order.as_ptr().cast());
+                _mm_storeu_ps(into.as_mut_ptr(), _mm_permutevar_ps(_mm256_cvtpd_ps(self.0), order));
+            }
         }
     }
 }

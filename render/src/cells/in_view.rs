@@ -7,15 +7,17 @@ use super::stats::Counts;
 use crate::volume::cells::Place;
 
 /// Steps of depth in which cells are told apart for going through them from front to back.
-const STEPS: usize = 256;
+const STEPS: usize = 1024;
 
 /// A tetrahedron that may show.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shown {
     pub(super) tetrahedron: u32,
     pub(super) reach: Rect,
-    /// Depth of its nearest corner, and that of its farthest.
-    pub(super) depths: [f64; 2],
+    /// Depth of its nearest corner.
+    pub(super) nearest: f64,
+    /// Depths of all corners, added.
+    depth: f64,
 }
 
 /// What of a cluster is before the camera.
@@ -101,7 +103,8 @@ impl InView {
                 counts.outside += 1;
                 continue;
             }
-            chosen.push(Shown { tetrahedron: index as u32, reach, depths: [nearest, farthest] });
+            let depth = (corners[0].z + corners[1].z) + (corners[2].z + corners[3].z);
+            chosen.push(Shown { tetrahedron: index as u32, reach, nearest, depth });
         }
     }
 
@@ -110,13 +113,12 @@ impl InView {
     fn put_in_order(&mut self, chosen: &[Shown]) {
         self.cells.clear();
         let Some(&any) = chosen.first() else { return };
-        let depth = |shown: &Shown| shown.depths[0] + shown.depths[1];
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for shown in chosen {
-            (low, high) = (low.min(depth(shown)), high.max(depth(shown)));
+            (low, high) = (low.min(shown.depth), high.max(shown.depth));
         }
         let scale = if high > low { STEPS as f64 / (high - low) } else { 0.0 };
-        let step = |shown: &Shown| (((depth(shown) - low) * scale) as usize).min(STEPS - 1);
+        let step = |shown: &Shown| (((shown.depth - low) * scale) as usize).min(STEPS - 1);
         let mut begins = [0_u32; STEPS];
         for shown in chosen {
             begins[step(shown)] += 1;

@@ -5,7 +5,7 @@ use super::early;
 use super::fold::{Segment, add_up, integrate, length, merge, overlap, sort, under};
 use super::in_view::{InView, Shown};
 use super::lens::Lens;
-use super::scan::{Raw, Raws, Rect, scan};
+use super::scan::{Found, Raw, Raws, Rect, scan};
 use super::stats::Counts;
 use super::table::{BATCH, Batch, Table};
 #[cfg(target_arch = "x86_64")]
@@ -156,13 +156,15 @@ impl Projector {
             if mine.is_empty() {
                 continue;
             }
-            if early.is_some_and(|table| table.hides(&mine, shown.depths[0])) {
+            if early.is_some_and(|table| table.hides(&mine, shown.nearest)) {
                 counts.hidden += 1;
                 continue;
             }
             counts.scanned += 1;
             reach = reach.join(&mine);
-            self.shown.push(Shown { reach: mine, ..*shown });
+            let mut shown = *shown;
+            shown.reach = mine;
+            self.shown.push(shown);
         }
         let mut top = reach.low[1];
         while top < reach.high[1] {
@@ -258,7 +260,7 @@ impl Projector {
         self.aside.clear();
         let (open, aside) = (&mut self.open, &mut self.aside);
         let tetrahedra = frame.clusters.tetrahedra(of.cluster);
-        let mut go_on = |raws: &[Raw], constant: Option<f32>| {
+        let mut go_on = |raws: Found<'_>, constant: Option<f32>| {
             counts.segments += raws.len() as u64;
             go_on(frame, raws, constant, open, aside);
         };
@@ -322,8 +324,8 @@ impl Projector {
             let corners = tetrahedra[index].map(|v| &of.view.corners[v as usize]);
             let constant = of.view.constants.get(index);
             let (totals, raws) = (&mut self.counts, &mut self.raws);
-            let mut keep = |found: &[Raw]| {
-                for &(mut raw) in found {
+            let mut keep = |found: Found<'_>| {
+                for mut raw in (0..found.len()).map(|n| found.get(n)) {
                     if only.is_none_or(|open| open[raw.pixel as usize].aside == MIXED) {
                         totals[raw.pixel as usize] += 1;
                         if let Some(&value) = constant {
@@ -390,7 +392,7 @@ impl Projector {
 /// Integrates stretches and goes on with the runs of their pixels.
 fn go_on(
     frame: &Frame<'_>,
-    raws: &[Raw],
+    raws: Found<'_>,
     constant: Option<f32>,
     open: &mut [Open],
     aside: &mut Vec<(Segment, u32)>,
@@ -404,7 +406,7 @@ fn go_on(
         #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
         fn wide(
             table: &Table,
-            raws: &[Raw],
+            raws: Found<'_>,
             constant: Option<f32>,
             open: &mut [Open],
             aside: &mut Vec<(Segment, u32)>,
@@ -422,20 +424,23 @@ fn go_on(
 #[inline(always)]
 fn go_on_by(
     table: &Table,
-    raws: &[Raw],
+    raws: Found<'_>,
     constant: Option<f32>,
     open: &mut [Open],
     aside: &mut Vec<(Segment, u32)>,
 ) {
-    for batch in raws.chunks(BATCH) {
+    for first in (0..raws.len()).step_by(BATCH) {
+        let count = BATCH.min(raws.len() - first);
         let (mut from, mut to, mut mm) = (Batch::of(0.0), Batch::of(0.0), Batch::of(0.0));
-        for (n, raw) in batch.iter().enumerate() {
+        for n in 0..count {
+            let raw = raws.get(first + n);
             [from.0[n], to.0[n]] = constant.map_or(raw.values, |value| [value; 2]);
             mm.0[n] = length(raw.back - raw.front, open[raw.pixel as usize].stretch);
         }
         let mut seen = Batch::of([0.0; 4]);
         table.segments([&from, &to], &mm, &mut seen);
-        for (raw, rgba) in batch.iter().zip(seen.0) {
+        for (n, rgba) in seen.0.into_iter().enumerate().take(count) {
+            let raw = raws.get(first + n);
             let Open { run, aside: last, .. } = &mut open[raw.pixel as usize];
             if raw.front == run.back {
                 under(&mut run.rgba, rgba);

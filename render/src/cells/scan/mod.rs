@@ -9,7 +9,7 @@
 mod planes;
 mod sides;
 
-use crate::simd::Four;
+use crate::simd::{Four, put_from};
 use planes::{Cell, Passed};
 use sides::Sides;
 
@@ -114,38 +114,89 @@ const FACES: [([usize; 3], [usize; 3]); 4] =
 /// What is gathered before it is handed on.
 const GATHERED: usize = 256;
 
-/// What rays have of cells, gathered until there is enough of it.
+/// What rays have of cells, gathered until there is enough of it: a [`Raw`] each, part by part.
 #[derive(Debug)]
 pub(super) struct Raws {
-    list: [Raw; GATHERED + LANES],
+    fronts: [f64; GATHERED + LANES],
+    backs: [f64; GATHERED + LANES],
+    from: [f32; GATHERED + LANES],
+    to: [f32; GATHERED + LANES],
+    pixels: [u32; GATHERED + LANES],
     count: usize,
 }
 
 impl Default for Raws {
     fn default() -> Self {
-        let none = Raw { front: 0.0, back: 0.0, values: [0.0; 2], pixel: 0 };
-        Self { list: [none; GATHERED + LANES], count: 0 }
+        Self {
+            fronts: [0.0; GATHERED + LANES],
+            backs: [0.0; GATHERED + LANES],
+            from: [0.0; GATHERED + LANES],
+            to: [0.0; GATHERED + LANES],
+            pixels: [0; GATHERED + LANES],
+            count: 0,
+        }
+    }
+}
+
+/// What was gathered.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Found<'a> {
+    pub(super) fronts: &'a [f64],
+    pub(super) backs: &'a [f64],
+    pub(super) from: &'a [f32],
+    pub(super) to: &'a [f32],
+    pub(super) pixels: &'a [u32],
+}
+
+impl Found<'_> {
+    pub(super) fn len(&self) -> usize {
+        self.pixels.len()
+    }
+
+    #[inline(always)]
+    pub(super) fn get(&self, n: usize) -> Raw {
+        let [front, back] = [self.fronts[n], self.backs[n]];
+        Raw { front, back, values: [self.from[n], self.to[n]], pixel: self.pixels[n] }
     }
 }
 
 impl Raws {
     /// Takes out what is there.
     #[inline(always)]
-    pub(super) fn take(&mut self) -> &[Raw] {
-        &self.list[..std::mem::take(&mut self.count)]
+    pub(super) fn take(&mut self) -> Found<'_> {
+        let count = std::mem::take(&mut self.count);
+        Found {
+            fronts: &self.fronts[..count],
+            backs: &self.backs[..count],
+            from: &self.from[..count],
+            to: &self.to[..count],
+            pixels: &self.pixels[..count],
+        }
     }
 
     /// Adds what those rays of a group pass that do.
     #[inline(always)]
     fn add_all<F: Four>(&mut self, first: u32, passed: &Passed<F>, hit: u32) {
-        let [fronts, backs] = passed.depths.map(F::to_array);
-        let [from, to] = passed.values.map(F::to_f32);
-        for lane in 0..LANES {
-            let values = [from[lane], to[lane]];
-            self.list[self.count] =
-                Raw { front: fronts[lane], back: backs[lane], values, pixel: first + lane as u32 };
-            self.count += (hit >> lane & 1) as usize;
+        // There is room for a group beyond what counts as full.
+        let at = self.count.min(GATHERED);
+        let [front, back] = passed.depths;
+        let [from, to] = passed.values;
+        if let Some(fronts) = self.fronts[at..].first_chunk_mut() {
+            front.put(hit, fronts);
         }
+        if let Some(backs) = self.backs[at..].first_chunk_mut() {
+            back.put(hit, backs);
+        }
+        if let Some(values) = self.from[at..].first_chunk_mut() {
+            from.put_f32(hit, values);
+        }
+        if let Some(values) = self.to[at..].first_chunk_mut() {
+            to.put_f32(hit, values);
+        }
+        if let Some(pixels) = self.pixels[at..].first_chunk_mut() {
+            put_from(first, hit, pixels);
+        }
+        self.count = at + hit.count_ones() as usize;
     }
 
     /// Adds where a ray passes two faces, if it does so before the eye.
@@ -158,7 +209,9 @@ impl Raws {
                 from += (to - from) * (front / (front - back));
                 front = 0.0;
             }
-            self.list[self.count] = Raw { front, back, values: [from as f32, to as f32], pixel };
+            let n = self.count;
+            (self.fronts[n], self.backs[n]) = (front, back);
+            (self.from[n], self.to[n], self.pixels[n]) = (from as f32, to as f32, pixel);
             self.count += 1;
         }
     }
@@ -172,7 +225,7 @@ pub(super) fn scan<F: Four>(
     rects: [&Rect; 2],
     perspective: bool,
     raws: &mut Raws,
-    full: &mut impl FnMut(&[Raw]),
+    full: &mut impl FnMut(Found<'_>),
 ) {
     let corners = &corners;
     let Some(cell) = Cell::new::<F>(corners, perspective) else {
@@ -196,7 +249,7 @@ fn plain<F: Four, const NEAR: usize, const PERSPECTIVE: bool>(
     corners: &[&Corner; 4],
     [rect, reach]: [&Rect; 2],
     raws: &mut Raws,
-    full: &mut impl FnMut(&[Raw]),
+    full: &mut impl FnMut(Found<'_>),
 ) {
     let width = rect.high[0] - rect.low[0];
     for j in reach.low[1]..reach.high[1] {
@@ -242,7 +295,7 @@ fn flat(
     [rect, reach]: [&Rect; 2],
     perspective: bool,
     raws: &mut Raws,
-    full: &mut impl FnMut(&[Raw]),
+    full: &mut impl FnMut(Found<'_>),
 ) {
     let width = rect.high[0] - rect.low[0];
     let sides = Sides::new(corners, perspective);
