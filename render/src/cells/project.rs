@@ -534,15 +534,15 @@ fn go_on_by(
     open: &mut [Open],
     aside: &mut Vec<(Segment, u32)>,
 ) {
-    for batch in raws.chunks(BATCH) {
-        let (mut from, mut to, mut mm) = (Batch::of(0.0), Batch::of(0.0), Batch::of(0.0));
-        for (n, raw) in batch.iter().enumerate() {
-            [from.0[n], to.0[n]] = constant.map_or(raw.values, |value| [value; 2]);
-            mm.0[n] = length(raw.back - raw.front, open[raw.pixel as usize].stretch);
+    let mut batch = Batch::new();
+    for raws in raws.chunks(BATCH) {
+        for (n, raw) in raws.iter().enumerate() {
+            let values = constant.map_or(raw.values, |value| [value; 2]);
+            batch.set(n, values, length(raw.back - raw.front, open[raw.pixel as usize].stretch));
         }
-        let mut seen = Batch::of([0.0; 4]);
-        table.segments([&from, &to], &mm, &mut seen);
-        for (raw, rgba) in batch.iter().zip(seen.0) {
+        table.segments(&mut batch, raws.len());
+        for (n, raw) in raws.iter().enumerate() {
+            let rgba = batch.seen(n);
             let Open { run, aside: last, .. } = &mut open[raw.pixel as usize];
             if raw.front == run.back {
                 under(&mut run.rgba, rgba);

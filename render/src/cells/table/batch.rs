@@ -1,122 +1,237 @@
-//! Several segments at once.
+//! Many segments at once, in steps that each go through all of them: what one step waits for is there by the next.
 
 use super::bins::{Bins, MARKED};
 use super::opacity::{behind, opacity};
-use super::{EVEN_COLOR, EVEN_DEPTH, Table};
+use super::{EVEN_COLOR, EVEN_DEPTH, Place, Table};
 
+/// Numbers that go through arithmetic together.
+const WIDE: usize = 8;
 /// Segments that go at once.
-pub(in super::super) const BATCH: usize = 8;
+pub(in super::super) const BATCH: usize = 64;
 /// Bins apart from which on sums have kept their digits.
 const APART: f32 = 1.0 / 32.0;
 
 /// One of each of several segments, where no access of memory straddles two lines of a cache.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(32))]
-pub(in super::super) struct Batch<T>(pub(in super::super) [T; BATCH]);
+struct Each<T>([[T; WIDE]; BATCH / WIDE]);
 
-impl<T: Copy> Batch<T> {
-    /// The same for all.
+impl<T: Copy> Each<T> {
+    fn of(all: T) -> Self {
+        Self([[all; WIDE]; BATCH / WIDE])
+    }
+
     #[inline(always)]
-    pub(in super::super) fn of(all: T) -> Self {
-        Self([all; BATCH])
+    fn set(&mut self, n: usize, value: T) {
+        self.0.as_flattened_mut()[n] = value;
     }
 }
 
-/// Several places.
+/// An end of each of several segments.
 #[derive(Debug)]
-struct Places {
-    /// In bins.
-    at: Batch<f64>,
-    bin: Batch<i32>,
-    /// How many bins behind its begin.
-    part: Batch<f32>,
+struct Ends {
+    position: Each<f32>,
+    /// The bin that it lies in, and how many bins behind its begin.
+    bin: Each<u32>,
+    part: Each<f32>,
 }
 
-impl Bins {
-    /// Looks positions up.
+impl Ends {
+    fn new() -> Self {
+        Self { position: Each::of(0.0), bin: Each::of(0), part: Each::of(0.0) }
+    }
+
+    /// Looks positions up; where they are in bins.
     #[inline(always)]
-    fn places(&self, positions: &Batch<f32>) -> Places {
-        let mut places = Places { at: Batch::of(0.0), bin: Batch::of(0), part: Batch::of(0.0) };
-        let [first, last] = self.range;
-        for n in 0..BATCH {
-            let at = f64::from(positions.0[n]) * self.scale;
-            let kept = at.max(first).min(last);
-            let whole = kept as i32;
-            let bin = whole - i32::from(kept < f64::from(whole));
-            places.at.0[n] = at;
-            places.bin.0[n] = bin;
-            places.part.0[n] = (at - f64::from(bin)) as f32;
+    fn look_up(&mut self, bins: &Bins, k: usize) -> [f64; WIDE] {
+        // Added and taken away again, it leaves the nearest whole number, which then is in its lowest digits.
+        const WHOLE: f64 = 6_755_399_441_055_744.0;
+        let [first, last] = bins.range;
+        let (mut at, mut begin) = ([0.0; WIDE], [0.0; WIDE]);
+        for n in 0..WIDE {
+            let x = f64::from(self.position.0[k][n]) * bins.scale;
+            let low = if x > first { x } else { first };
+            let kept = if low < last { low } else { last };
+            let nearest = (kept + WHOLE) - WHOLE;
+            begin[n] = if nearest > kept { nearest - 1.0 } else { nearest };
+            at[n] = x;
         }
-        places
+        for n in 0..WIDE {
+            self.part.0[k][n] = (at[n] - begin[n]) as f32;
+            self.bin.0[k][n] = ((begin[n] - first) + WHOLE).to_bits() as u32;
+        }
+        at
+    }
+}
+
+/// Several segments, and what is seen of them.
+#[derive(Debug)]
+pub(in super::super) struct Batch {
+    from: Ends,
+    to: Ends,
+    mm: Each<f32>,
+    /// What the difference of sums counts, and the sum of rates.
+    apart: Each<f32>,
+    near: Each<f32>,
+    /// Optical depth, and of all lengths of colour how much it varies.
+    tau: Each<f32>,
+    varies: Each<f32>,
+    /// Differences of the ramps, and marks.
+    ramps: Each<u32>,
+    alone: Each<u32>,
+    /// How much is seen for one of optical depth, and by how much the colour of the end falls behind.
+    part: Each<f32>,
+    lag: Each<f32>,
+    /// Optical depth times colour, and optical depth; then what is seen.
+    seen: Each<[f32; 4]>,
+    /// What colour and rates are at the end less what they are at the begin.
+    turn: Each<[f32; 4]>,
+    rise: Each<[f32; 4]>,
+}
+
+impl Batch {
+    /// With nothing in it.
+    pub(in super::super) fn new() -> Self {
+        Self {
+            from: Ends::new(),
+            to: Ends::new(),
+            mm: Each::of(0.0),
+            apart: Each::of(0.0),
+            near: Each::of(0.0),
+            tau: Each::of(0.0),
+            varies: Each::of(0.0),
+            ramps: Each::of(0),
+            alone: Each::of(0),
+            part: Each::of(0.0),
+            lag: Each::of(0.0),
+            seen: Each::of([0.0; 4]),
+            turn: Each::of([0.0; 4]),
+            rise: Each::of([0.0; 4]),
+        }
+    }
+
+    /// Puts a segment in: `mm` along which the scalar runs from one position to another.
+    #[inline(always)]
+    pub(in super::super) fn set(&mut self, n: usize, [from, to]: [f32; 2], mm: f32) {
+        self.from.position.set(n, from);
+        self.to.position.set(n, to);
+        self.mm.set(n, mm);
+    }
+
+    /// Colour, premultiplied, and opacity.
+    #[inline(always)]
+    pub(in super::super) fn seen(&self, n: usize) -> [f32; 4] {
+        self.seen.0.as_flattened()[n]
+    }
+
+    #[inline(always)]
+    fn look_up(&mut self, bins: &Bins, k: usize) {
+        let (a, b) = (self.from.look_up(bins, k), self.to.look_up(bins, k));
+        for n in 0..WIDE {
+            let rise = (b[n] - a[n]) as f32;
+            let mm = self.mm.0[k][n];
+            // Between places of one bin, or all but one, the mean is that of the rates at them.
+            let is_near = (self.from.bin.0[k][n] == self.to.bin.0[k][n]) | (rise.abs() < APART);
+            self.apart.0[k][n] = if is_near { 0.0 } else { mm / rise };
+            self.near.0[k][n] = if is_near { 0.5 * mm } else { 0.0 };
+        }
+    }
+
+    /// Optical depth times colour, and optical depth.
+    #[inline(always)]
+    fn add_up(&mut self, bins: &Bins, k: usize) {
+        for n in 0..WIDE {
+            let p = bins.pair(self.from.bin.0[k][n]);
+            let q = bins.pair(self.to.bin.0[k][n]);
+            let begin = p[0].within(&p[1], self.from.part.0[k][n]);
+            let end = q[0].within(&q[1], self.to.part.0[k][n]);
+            let (apart, near) = (self.apart.0[k][n], self.near.0[k][n]);
+            let (mut depth, mut turn, mut rise) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+            for c in 0..4 {
+                let sum = (end.sum[c] - begin.sum[c]) as f32 + (end.ahead[c] - begin.ahead[c]);
+                depth[c] = sum * apart + (begin.rate[c] + end.rate[c]) * near;
+                turn[c] = end.light[c] - begin.light[c];
+                rise[c] = end.rate[c] - begin.rate[c];
+            }
+            self.seen.0[k][n] = depth;
+            self.turn.0[k][n] = turn;
+            self.rise.0[k][n] = rise;
+            self.varies.0[k][n] = end.varied - begin.varied;
+            self.ramps.0[k][n] = (p[0].ramp ^ q[0].ramp) | ((p[0].ramp | q[0].ramp) & MARKED);
+        }
+    }
+
+    /// From optical depth to what is seen.
+    #[inline(always)]
+    fn shade(&mut self, k: usize) {
+        let (mut tau, mut change) = ([0.0; WIDE], [0.0; WIDE]);
+        for n in 0..WIDE {
+            tau[n] = self.seen.0[k][n][3];
+            change[n] = self.rise.0[k][n][3];
+        }
+        for n in 0..WIDE {
+            let t = tau[n];
+            let opacity = opacity(t);
+            let varies = self.varies.0[k][n].abs();
+            let uneven = t * varies > EVEN_COLOR;
+            let rough = change[n].abs() * self.mm.0[k][n] * varies > EVEN_DEPTH;
+            let ramps = self.ramps.0[k][n];
+            // What is marked or no number, or changes too much, is seen to by itself.
+            let much = uneven & (rough | (ramps != 0));
+            self.alone.0[k][n] = u32::from(much | t.is_nan() | (ramps >= MARKED));
+            let is_seen = t > 0.0;
+            let (part, lag) = (opacity / t, behind(t, opacity));
+            self.part.0[k][n] = if is_seen { part } else { 0.0 };
+            self.lag.0[k][n] = if is_seen { lag } else { 0.0 };
+            self.tau.0[k][n] = if is_seen { opacity } else { 0.0 };
+        }
+        for n in 0..WIDE {
+            let (part, lag) = (self.part.0[k][n], self.lag.0[k][n]);
+            let (mut seen, turn) = (self.seen.0[k][n], self.turn.0[k][n]);
+            for c in 0..4 {
+                seen[c] = seen[c] * part + turn[c] * lag;
+            }
+            seen[3] = self.tau.0[k][n];
+            self.seen.0[k][n] = seen;
+        }
     }
 }
 
 impl Table {
-    /// As [`Self::segment`], of several at once.
+    /// As [`Self::segment`], of the first `count` of a batch.
     #[inline(always)]
-    pub(in super::super) fn segments(
-        &self,
-        [from, to]: [&Batch<f32>; 2],
-        mm: &Batch<f32>,
-        seen: &mut Batch<[f32; 4]>,
-    ) {
-        let (a, b) = (self.bins.places(from), self.bins.places(to));
-        let (mut by, mut near) = (Batch::of(0.0), Batch::of(0.0));
-        for n in 0..BATCH {
-            let rise = (b.at.0[n] - a.at.0[n]) as f32;
-            // Between places of one bin, or all but one, the mean is that of the rates at them.
-            let is_near = (a.bin.0[n] == b.bin.0[n]) | (rise.abs() < APART);
-            by.0[n] = if is_near { 0.0 } else { mm.0[n] / rise };
-            near.0[n] = if is_near { 0.5 * mm.0[n] } else { 0.0 };
+    pub(in super::super) fn segments(&self, batch: &mut Batch, count: usize) {
+        let wide = count.div_ceil(WIDE).min(BATCH / WIDE);
+        for k in 0..wide {
+            batch.look_up(&self.bins, k);
         }
-        let mut turn = Batch::of([0.0; 4]);
-        let (mut tau, mut change, mut varies) = (Batch::of(0.0), Batch::of(0.0), Batch::of(0.0));
-        let (mut marks, mut across) = (Batch::of(0_u32), Batch::of(0_u32));
-        for n in 0..BATCH {
-            let [p, q] = [&a, &b].map(|places| self.bins.pair(places.bin.0[n]));
-            let (p, q) = (&p[0], &q[0]);
-            let begin = self.bins.pair(a.bin.0[n]);
-            let finish = self.bins.pair(b.bin.0[n]);
-            let begin = begin[0].within(&begin[1], a.part.0[n]);
-            let finish = finish[0].within(&finish[1], b.part.0[n]);
-            let mut depth = [0.0; 4];
-            for c in 0..4 {
-                let sum = (finish.sum[c] - begin.sum[c]) as f32 + (finish.ahead[c] - begin.ahead[c]);
-                depth[c] = sum * by.0[n] + (begin.rate[c] + finish.rate[c]) * near.0[n];
-                turn.0[n][c] = finish.light[c] - begin.light[c];
+        for k in 0..wide {
+            batch.add_up(&self.bins, k);
+        }
+        for k in 0..wide {
+            batch.shade(k);
+        }
+        for k in 0..wide {
+            if batch.alone.0[k].iter().fold(0, |any, alone| any | alone) != 0 {
+                self.alone(batch, k);
             }
-            seen.0[n] = depth;
-            tau.0[n] = depth[3];
-            change.0[n] = turn.0[n][3];
-            varies.0[n] = finish.varied - begin.varied;
-            marks.0[n] = p.ramp | q.ramp;
-            across.0[n] = p.ramp ^ q.ramp;
         }
-        let mut alone = Batch::of(0_u32);
-        let (mut part, mut lag) = (Batch::of(0.0), Batch::of(0.0));
-        for n in 0..BATCH {
-            let t = tau.0[n];
-            let opacity = opacity(t);
-            let varies = varies.0[n].abs();
-            let uneven = t * varies > EVEN_COLOR;
-            let rough = change.0[n].abs() * mm.0[n] * varies > EVEN_DEPTH;
-            // What is marked or no number, or changes too much, is seen to by itself.
-            let much = uneven & (rough | (across.0[n] != 0));
-            alone.0[n] = u32::from(much | t.is_nan() | (marks.0[n] >= MARKED));
-            part.0[n] = if t > 0.0 { opacity / t } else { 0.0 };
-            lag.0[n] = if t > 0.0 { behind(t, opacity) } else { 0.0 };
-            tau.0[n] = if t > 0.0 { opacity } else { 0.0 };
-        }
-        for n in 0..BATCH {
-            for c in 0..4 {
-                seen.0[n][c] = seen.0[n][c] * part.0[n] + turn.0[n][c] * lag.0[n];
+    }
+
+    /// Looks a position up that need not be near another.
+    fn search(&self, position: f32) -> Place {
+        let after = self.pieces.partition_point(|piece| piece.from <= position);
+        self.find(position, after.saturating_sub(1))
+    }
+
+    /// Sees to those by themselves that have to be.
+    #[inline(never)]
+    fn alone(&self, batch: &mut Batch, k: usize) {
+        for n in 0..WIDE {
+            if batch.alone.0[k][n] != 0 {
+                let [from, to] = [&batch.from, &batch.to].map(|ends| self.search(ends.position.0[k][n]));
+                batch.seen.0[k][n] = self.segment(&from, &to, batch.mm.0[k][n]);
             }
-            seen.0[n][3] = tau.0[n];
-        }
-        for n in (0..BATCH).filter(|&n| alone.0[n] != 0) {
-            let [a, b] = [(from, &a), (to, &b)]
-                .map(|(x, places)| self.find(x.0[n], self.bins.pair(places.bin.0[n])[0].piece as usize));
-            seen.0[n] = self.segment(&a, &b, mm.0[n]);
         }
     }
 }

@@ -24,15 +24,14 @@ pub(super) const MARKED: u32 = 1 << 31;
 pub(super) struct Bin {
     /// Antiderivative at its begin, for one of bins: (τ·red, τ·green, τ·blue, τ).
     sum: [f64; 4],
-    /// (red, green, blue, τ) there.
+    /// (red, green, blue, 1) there.
     light: [f32; 4],
+    tau: f32,
     /// How much colour has varied up to there, and goes on to in the bin.
     varied: f32,
     varies: f32,
     /// The ramp, with [`MARKED`].
     pub(super) ramp: u32,
-    /// The piece that it begins in.
-    pub(super) piece: u32,
 }
 
 /// The function at a place in a bin.
@@ -52,7 +51,7 @@ pub(super) struct Bins {
     list: Vec<Bin>,
     /// Bins for one of position.
     pub(super) scale: f64,
-    /// Numbers of the first and of the last, counted from the first control point.
+    /// Where the first bin begins and the last but one, in bins from the first control point.
     pub(super) range: [f64; 2],
 }
 
@@ -86,21 +85,20 @@ impl Bins {
             list.push(Bin {
                 sum: here.sum.map(|sum| sum * scale),
                 light: here.light.map(|v| v as f32),
+                tau: here.rate[3] as f32,
                 varied: here.varied as f32,
                 varies: 0.0,
                 ramp: exact.pieces[piece].ramp,
-                piece: piece as u32,
             });
             before = Some(here);
         }
         Self { list, scale, range: [f64::from(-BELOW), count as f64] }
     }
 
-    /// The bin of a number within [`Self::range`], and the next.
+    /// A bin and the next.
     #[inline(always)]
-    pub(super) fn pair(&self, number: i32) -> &[Bin] {
-        let index = (number + BELOW) as usize;
-        &self.list[index..index + 2]
+    pub(super) fn pair(&self, bin: u32) -> &[Bin] {
+        &self.list[bin as usize..bin as usize + 2]
     }
 }
 
@@ -108,15 +106,13 @@ impl Bin {
     /// So many bins behind its begin.
     #[inline(always)]
     pub(super) fn within(&self, next: &Self, part: f32) -> Within {
-        let tau = self.light[3];
-        let by = [tau, tau, tau, 1.0];
         let (mut ahead, mut rate, mut light) = ([0.0; 4], [0.0; 4], [0.0; 4]);
         for c in 0..4 {
-            let begin = self.light[c] * by[c];
+            let begin = self.light[c] * self.tau;
             let half_rise = (next.sum[c] - self.sum[c]) as f32 - begin;
             let rise = part * half_rise;
             ahead[c] = part * (begin + rise);
-            rate[c] = begin + 2.0 * rise;
+            rate[c] = begin + (rise + rise);
             light[c] = self.light[c] + part * (next.light[c] - self.light[c]);
         }
         Within { sum: self.sum, ahead, rate, light, varied: self.varied + part * self.varies }
@@ -166,7 +162,7 @@ struct At {
     sum: [f64; 4],
     /// (τ·red, τ·green, τ·blue, τ).
     rate: [f64; 4],
-    /// (red, green, blue, τ).
+    /// (red, green, blue, 1).
     light: [f64; 4],
     varied: f64,
 }
@@ -190,7 +186,7 @@ impl Exact<'_> {
             sum: std::array::from_fn(|c| node.sum[c] + part * (from[c] + part * half_rise[c]) * width),
             rate,
             light: std::array::from_fn(|c| match c {
-                3 => rate[3],
+                3 => 1.0,
                 _ => f64::from(piece.color[c]) + f64::from(piece.slope[c]) * ahead,
             }),
             varied: f64::from(piece.varied) + f64::from(piece.varies) * ahead,
@@ -210,7 +206,7 @@ impl Exact<'_> {
                 let rate = from.rate[c] + 2.0 * part * (mean[c] - from.rate[c]);
                 let light = from.light[c] + part * (to.light[c] - from.light[c]);
                 let same = (at.rate[c] - rate).abs() <= SAME * peak;
-                same && (c == 3 || peak == 0.0 || (at.light[c] - light).abs() <= SAME)
+                same && (peak == 0.0 || (at.light[c] - light).abs() <= SAME)
             })
         };
         let mut even = true;

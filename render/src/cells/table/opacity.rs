@@ -27,11 +27,13 @@ pub(in super::super) fn opacity(tau: f32) -> f32 {
 fn exp_minus(tau: f32) -> f32 {
     // ln 2 in two parts, the first of few digits, so that its multiples are exact.
     const LN_2: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
+    // Added, it leaves the nearest whole number in the lowest digits.
+    const WHOLE: f32 = 12_582_912.0;
     let tau = if tau < 87.0 { tau } else { 87.0 };
-    let halvings = (tau * std::f32::consts::LOG2_E + 0.5) as i32;
-    let count = halvings as f32;
+    let halvings = tau * std::f32::consts::LOG2_E + WHOLE;
+    let count = halvings - WHOLE;
     let rest = (count * LN_2[0] - tau) + count * LN_2[1];
     let series = rest * (1.0 / 6.0 + rest * (1.0 / 24.0 + rest * (1.0 / 120.0 + rest * (1.0 / 720.0))));
     let power = 1.0 + rest * (1.0 + rest * (0.5 + series));
-    power * f32::from_bits(((127 - halvings) as u32) << 23)
+    power * f32::from_bits((127_u32 << 23).wrapping_sub(halvings.to_bits() << 23))
 }
