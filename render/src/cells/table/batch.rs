@@ -2,6 +2,7 @@
 
 use super::bins::{Bins, MARKED};
 use super::opacity::{behind, opacity};
+use super::quad::Quad;
 use super::{EVEN_COLOR, EVEN_DEPTH, Place, Table};
 
 /// Numbers that go through arithmetic together.
@@ -73,8 +74,8 @@ pub(in super::super) struct Batch {
     /// What the difference of sums counts, and the sum of rates.
     apart: Each<f32>,
     near: Each<f32>,
-    /// Optical depth, and of all lengths of colour how much it varies.
-    tau: Each<f32>,
+    /// Opacity, and how much colour varies all along.
+    opacity: Each<f32>,
     varies: Each<f32>,
     /// Differences of the ramps, and marks.
     ramps: Each<u32>,
@@ -83,10 +84,11 @@ pub(in super::super) struct Batch {
     part: Each<f32>,
     lag: Each<f32>,
     /// Optical depth times colour, and optical depth; then what is seen.
-    seen: Each<[f32; 4]>,
-    /// What colour and rates are at the end less what they are at the begin.
-    turn: Each<[f32; 4]>,
-    rise: Each<[f32; 4]>,
+    seen: Each<Quad>,
+    /// The colour at the end less that at the begin.
+    turn: Each<Quad>,
+    /// How much more extinction there is at the end than at the begin.
+    rise: Each<f32>,
 }
 
 impl Batch {
@@ -98,15 +100,15 @@ impl Batch {
             mm: Each::of(0.0),
             apart: Each::of(0.0),
             near: Each::of(0.0),
-            tau: Each::of(0.0),
+            opacity: Each::of(0.0),
             varies: Each::of(0.0),
             ramps: Each::of(0),
             alone: Each::of(0),
             part: Each::of(0.0),
             lag: Each::of(0.0),
-            seen: Each::of([0.0; 4]),
-            turn: Each::of([0.0; 4]),
-            rise: Each::of([0.0; 4]),
+            seen: Each::of(Quad::all(0.0)),
+            turn: Each::of(Quad::all(0.0)),
+            rise: Each::of(0.0),
         }
     }
 
@@ -121,7 +123,8 @@ impl Batch {
     /// Colour, premultiplied, and opacity.
     #[inline(always)]
     pub(in super::super) fn seen(&self, n: usize) -> [f32; 4] {
-        self.seen.0.as_flattened()[n]
+        let [r, g, b, _] = self.seen.0.as_flattened()[n].array();
+        [r, g, b, self.opacity.0.as_flattened()[n]]
     }
 
     #[inline(always)]
@@ -145,17 +148,10 @@ impl Batch {
             let q = bins.pair(self.to.bin.0[k][n]);
             let begin = p[0].within(&p[1], self.from.part.0[k][n]);
             let end = q[0].within(&q[1], self.to.part.0[k][n]);
-            let (apart, near) = (self.apart.0[k][n], self.near.0[k][n]);
-            let (mut depth, mut turn, mut rise) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-            for c in 0..4 {
-                let sum = (end.sum[c] - begin.sum[c]) as f32 + (end.ahead[c] - begin.ahead[c]);
-                depth[c] = sum * apart + (begin.rate[c] + end.rate[c]) * near;
-                turn[c] = end.light[c] - begin.light[c];
-                rise[c] = end.rate[c] - begin.rate[c];
-            }
-            self.seen.0[k][n] = depth;
-            self.turn.0[k][n] = turn;
-            self.rise.0[k][n] = rise;
+            let [apart, near] = [self.apart.0[k][n], self.near.0[k][n]].map(Quad::all);
+            self.seen.0[k][n] = end.since(&begin) * apart + (begin.rate + end.rate) * near;
+            self.turn.0[k][n] = end.light - begin.light;
+            self.rise.0[k][n] = (end.rate - begin.rate).array()[3];
             self.varies.0[k][n] = end.varied - begin.varied;
             self.ramps.0[k][n] = (p[0].ramp ^ q[0].ramp) | ((p[0].ramp | q[0].ramp) & MARKED);
         }
@@ -164,17 +160,16 @@ impl Batch {
     /// From optical depth to what is seen.
     #[inline(always)]
     fn shade(&mut self, k: usize) {
-        let (mut tau, mut change) = ([0.0; WIDE], [0.0; WIDE]);
+        let mut tau = [0.0; WIDE];
         for n in 0..WIDE {
-            tau[n] = self.seen.0[k][n][3];
-            change[n] = self.rise.0[k][n][3];
+            tau[n] = self.seen.0[k][n].array()[3];
         }
         for n in 0..WIDE {
             let t = tau[n];
             let opacity = opacity(t);
             let varies = self.varies.0[k][n].abs();
             let uneven = t * varies > EVEN_COLOR;
-            let rough = change[n].abs() * self.mm.0[k][n] * varies > EVEN_DEPTH;
+            let rough = self.rise.0[k][n].abs() * self.mm.0[k][n] * varies > EVEN_DEPTH;
             let ramps = self.ramps.0[k][n];
             // What is marked or no number, or changes too much, is seen to by itself.
             let much = uneven & (rough | (ramps != 0));
@@ -183,16 +178,12 @@ impl Batch {
             let (part, lag) = (opacity / t, behind(t, opacity));
             self.part.0[k][n] = if is_seen { part } else { 0.0 };
             self.lag.0[k][n] = if is_seen { lag } else { 0.0 };
-            self.tau.0[k][n] = if is_seen { opacity } else { 0.0 };
+            self.opacity.0[k][n] = if is_seen { opacity } else { 0.0 };
         }
         for n in 0..WIDE {
             let (part, lag) = (self.part.0[k][n], self.lag.0[k][n]);
-            let (mut seen, turn) = (self.seen.0[k][n], self.turn.0[k][n]);
-            for c in 0..4 {
-                seen[c] = seen[c] * part + turn[c] * lag;
-            }
-            seen[3] = self.tau.0[k][n];
-            self.seen.0[k][n] = seen;
+            let (depth, turn) = (self.seen.0[k][n], self.turn.0[k][n]);
+            self.seen.0[k][n] = depth * Quad::all(part) + turn * Quad::all(lag);
         }
     }
 }
@@ -230,7 +221,9 @@ impl Table {
         for n in 0..WIDE {
             if batch.alone.0[k][n] != 0 {
                 let [from, to] = [&batch.from, &batch.to].map(|ends| self.search(ends.position.0[k][n]));
-                batch.seen.0[k][n] = self.segment(&from, &to, batch.mm.0[k][n]);
+                let seen = self.segment(&from, &to, batch.mm.0[k][n]);
+                batch.seen.0[k][n] = Quad::new(seen);
+                batch.opacity.0[k][n] = seen[3];
             }
         }
     }

@@ -4,6 +4,7 @@
 //! of bins at the ends of a segment are not exact, and bins in which these would be off by more than [`SAME`] are marked.
 //! The width is such that control points fall between bins if any width near by has it so.
 
+use super::quad::Quad;
 use super::{Node, Piece};
 
 /// Bins below the first control point: a constant one, and one that ends there.
@@ -22,10 +23,11 @@ pub(super) const MARKED: u32 = 1 << 31;
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct Bin {
-    /// Antiderivative at its begin, for one of bins: (τ·red, τ·green, τ·blue, τ).
-    sum: [f64; 4],
+    /// Antiderivative at its begin, for one of bins: (τ·red, τ·green, τ·blue, τ), and what rounding has left of it.
+    sum: Quad,
+    rest: Quad,
     /// (red, green, blue, 1) there.
-    light: [f32; 4],
+    light: Quad,
     tau: f32,
     /// How much colour has varied up to there, and goes on to in the bin.
     varied: f32,
@@ -38,11 +40,19 @@ pub(super) struct Bin {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Within {
     /// Antiderivative at the begin of the bin, and from there on.
-    pub(super) sum: [f64; 4],
-    pub(super) ahead: [f32; 4],
-    pub(super) rate: [f32; 4],
-    pub(super) light: [f32; 4],
+    sum: Quad,
+    ahead: Quad,
+    pub(super) rate: Quad,
+    pub(super) light: Quad,
     pub(super) varied: f32,
+}
+
+impl Within {
+    /// The antiderivative less that at another place.
+    #[inline(always)]
+    pub(super) fn since(&self, from: &Self) -> Quad {
+        (self.sum - from.sum) + (self.ahead - from.ahead)
+    }
 }
 
 /// All bins.
@@ -82,9 +92,11 @@ impl Bins {
                     bin.ramp |= MARKED;
                 }
             }
+            let sum = here.sum.map(|sum| (sum * scale) as f32);
             list.push(Bin {
-                sum: here.sum.map(|sum| sum * scale),
-                light: here.light.map(|v| v as f32),
+                sum: Quad::new(sum),
+                rest: Quad::new(std::array::from_fn(|c| (here.sum[c] * scale - f64::from(sum[c])) as f32)),
+                light: Quad::new(here.light.map(|v| v as f32)),
                 tau: here.rate[3] as f32,
                 varied: here.varied as f32,
                 varies: 0.0,
@@ -106,16 +118,17 @@ impl Bin {
     /// So many bins behind its begin.
     #[inline(always)]
     pub(super) fn within(&self, next: &Self, part: f32) -> Within {
-        let (mut ahead, mut rate, mut light) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-        for c in 0..4 {
-            let begin = self.light[c] * self.tau;
-            let half_rise = (next.sum[c] - self.sum[c]) as f32 - begin;
-            let rise = part * half_rise;
-            ahead[c] = part * (begin + rise);
-            rate[c] = begin + (rise + rise);
-            light[c] = self.light[c] + part * (next.light[c] - self.light[c]);
+        let behind = Quad::all(part);
+        let begin = self.light * Quad::all(self.tau);
+        let mean = (next.sum - self.sum) + (next.rest - self.rest);
+        let rise = behind * (mean - begin);
+        Within {
+            sum: self.sum,
+            ahead: self.rest + behind * (begin + rise),
+            rate: begin + (rise + rise),
+            light: self.light + behind * (next.light - self.light),
+            varied: self.varied + part * self.varies,
         }
-        Within { sum: self.sum, ahead, rate, light, varied: self.varied + part * self.varies }
     }
 }
 

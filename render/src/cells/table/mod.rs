@@ -14,6 +14,7 @@ mod bins;
 mod make;
 mod opacity;
 mod parts;
+mod quad;
 #[cfg(test)]
 mod tests;
 
