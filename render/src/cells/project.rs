@@ -363,11 +363,12 @@ impl Projector {
         }
         self.aside.clear();
         let (open, aside) = (&mut self.open, &mut self.aside);
+        let mut batch = Batch::new();
         let constants = (frame.scalars.place() == Place::Cells).then_some(&self.values[..]);
         let tetrahedra = frame.clusters.tetrahedra(cluster);
         let mut go_on = |raws: &[Raw], constant: Option<f32>| {
             counts.segments += raws.len() as u64;
-            go_on(frame, raws, constant, open, aside);
+            go_on(frame, raws, constant, &mut batch, open, aside);
         };
         for shown in &self.shown {
             let reach = shown.reach.meet(tile);
@@ -499,11 +500,12 @@ fn go_on(
     frame: &Frame<'_>,
     raws: &[Raw],
     constant: Option<f32>,
+    batch: &mut Batch,
     open: &mut [Open],
     aside: &mut Vec<(Segment, u32)>,
 ) {
     if !frame.wide {
-        go_on_by(frame.table, raws, constant, open, aside);
+        go_on_by(frame.table, raws, constant, batch, open, aside);
         return;
     }
     #[cfg(target_arch = "x86_64")]
@@ -513,15 +515,16 @@ fn go_on(
             table: &Table,
             raws: &[Raw],
             constant: Option<f32>,
+            batch: &mut Batch,
             open: &mut [Open],
             aside: &mut Vec<(Segment, u32)>,
         ) {
-            go_on_by(table, raws, constant, open, aside);
+            go_on_by(table, raws, constant, batch, open, aside);
         }
         #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
         // SAFETY: `wide` is set only where these instructions were detected.
         unsafe {
-            wide(frame.table, raws, constant, open, aside);
+            wide(frame.table, raws, constant, batch, open, aside);
         }
     }
 }
@@ -531,16 +534,16 @@ fn go_on_by(
     table: &Table,
     raws: &[Raw],
     constant: Option<f32>,
+    batch: &mut Batch,
     open: &mut [Open],
     aside: &mut Vec<(Segment, u32)>,
 ) {
-    let mut batch = Batch::new();
     for raws in raws.chunks(BATCH) {
         for (n, raw) in raws.iter().enumerate() {
             let values = constant.map_or(raw.values, |value| [value; 2]);
             batch.set(n, values, length(raw.back - raw.front, open[raw.pixel as usize].stretch));
         }
-        table.segments(&mut batch, raws.len());
+        table.segments(batch, raws.len());
         for (n, raw) in raws.iter().enumerate() {
             let rgba = batch.seen(n);
             let Open { run, aside: last, .. } = &mut open[raw.pixel as usize];

@@ -209,7 +209,9 @@ impl Exact<'_> {
     /// Whether a bin between two positions, which begins in one piece and after which another one begins, is all but what
     /// lines between its ends make it.
     fn is_even(&self, from: &At, to: &At, [first, after]: [usize; 2], [begin, end]: [f64; 2]) -> bool {
-        if self.pieces[first].ramp == self.pieces[after].ramp && self.pieces[first].first == self.pieces[first].last {
+        if self.pieces[first].ramp == self.pieces[after].ramp
+            && self.pieces[first].first == self.pieces[first].last
+        {
             return true;
         }
         let width = end - begin;

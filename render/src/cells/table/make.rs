@@ -128,7 +128,6 @@ impl Made {
             rough: steepest as f32 * most(slope),
         });
     }
-
 }
 
 /// Where opacity comes so near to 1 that its extinction grows without bound, a ramp is cut wherever what comes through has

@@ -2,12 +2,15 @@
 //!
 //! The mean of extinction, and of extinction times colour, between two values is the difference of their antiderivatives
 //! over that of the values (pre-integration with tables of one dimension, Engel 2001). The function is cut at its control
-//! points, and towards full opacity wherever what comes through halves, so that no bend and no jump lies within a piece; each piece has nodes of its own, and the sums at the nodes are
-//! worked out from -ln(1 - a) itself.
+//! points, and towards full opacity wherever what comes through halves, so that no bend and no jump lies within a piece; each
+//! piece has nodes of its own, and the sums at the nodes are worked out from -ln(1 - a) itself.
 //!
 //! A mean says nothing about which colour lies in front. Where that would show, a segment is cut at the control points and
 //! as often as needed in between; each part has its mean, and how much nearer the colour at its begin is than that at its end
 //! follows in closed form for an even extinction and a colour that runs linearly.
+//!
+//! Many segments at once are looked up without a search, in bins of one width made of the pieces; the few for which these do
+//! not do are seen to by themselves. Of either, what is seen of a segment is within 0.2 of 1/255 of the truth.
 
 mod batch;
 mod bins;
@@ -153,7 +156,6 @@ impl Table {
     pub(super) fn at(&self, position: f32, near: &Place) -> Place {
         if position == near.position { *near } else { self.find(position, near.piece) }
     }
-
 
     /// A place to begin a search with.
     pub(super) fn start(&self) -> &Place {
