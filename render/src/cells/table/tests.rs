@@ -2,7 +2,9 @@ use super::{BATCH, Batch, Table};
 use crate::volume::{ControlPoint, Transfer};
 
 fn transfer(points: &[[f64; 5]], unit_mm: f64) -> Transfer {
-    let point = |&[value, r, g, b, a]: &[f64; 5]| ControlPoint { value, rgba: [r, g, b, a] };
+    // Positions are of single precision: control points between two of them cannot be told from these.
+    let single = |value: f64| f64::from(value as f32);
+    let point = |&[value, r, g, b, a]: &[f64; 5]| ControlPoint { value: single(value), rgba: [r, g, b, a] };
     Transfer::new(points.iter().map(point).collect(), unit_mm).expect("a function")
 }
 
@@ -31,14 +33,17 @@ fn functions() -> Vec<(&'static str, Transfer)> {
                 1.0,
             ),
         ),
-        ("to full opacity", transfer(&[[0.0, 1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 1.0, 1.0]], 2.0)),
+        (
+            "to all but full opacity",
+            transfer(&[[0.0, 1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 1.0, 0.9999]], 2.0),
+        ),
         (
             "a narrow window",
             transfer(
                 &[
                     [0.0, 0.0, 0.0, 1.0, 0.0],
                     [0.5, 0.0, 1.0, 0.0, 0.0],
-                    [0.5001, 1.0, 1.0, 1.0, 0.9],
+                    [0.5001, 1.0, 1.0, 1.0, 0.8],
                     [0.5003, 1.0, 0.0, 0.0, 0.0],
                     [1.0, 0.0, 1.0, 1.0, 0.01],
                 ],
