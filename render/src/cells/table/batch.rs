@@ -161,19 +161,19 @@ impl Batch {
     #[inline(always)]
     fn shade(&mut self, k: usize) {
         let mut tau = [0.0; WIDE];
-        for n in 0..WIDE {
-            tau[n] = self.seen.0[k][n].array()[3];
+        for (n, tau) in tau.iter_mut().enumerate() {
+            *tau = self.seen.0[k][n].array()[3];
         }
-        for n in 0..WIDE {
-            let t = tau[n];
+        for (n, t) in tau.into_iter().enumerate() {
             let opacity = opacity(t);
             let varies = self.varies.0[k][n].abs();
             let uneven = t * varies > EVEN_COLOR;
             let rough = self.rise.0[k][n].abs() * self.mm.0[k][n] * varies > EVEN_DEPTH;
             let ramps = self.ramps.0[k][n];
             // What is marked or no number, or changes too much, is seen to by itself.
-            let much = uneven & (rough | (ramps != 0));
-            self.alone.0[k][n] = u32::from(much | t.is_nan() | (ramps >= MARKED));
+            let much = if rough { 1 } else { ramps };
+            let marked = if t.is_nan() { 1 } else { ramps & MARKED };
+            self.alone.0[k][n] = if uneven { much } else { marked };
             let is_seen = t > 0.0;
             let (part, lag) = (opacity / t, behind(t, opacity));
             self.part.0[k][n] = if is_seen { part } else { 0.0 };
