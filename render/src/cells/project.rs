@@ -259,10 +259,11 @@ impl Projector {
         }
         self.aside.clear();
         let (open, aside) = (&mut self.open, &mut self.aside);
+        let mut batch = Batch::new();
         let tetrahedra = frame.clusters.tetrahedra(of.cluster);
         let mut go_on = |raws: Found<'_>, constant: Option<f32>| {
             counts.segments += raws.len() as u64;
-            go_on(frame, raws, constant, open, aside);
+            go_on(frame, raws, constant, &mut batch, open, aside);
         };
         for shown in &self.shown {
             let reach = shown.reach.meet(tile);
@@ -394,11 +395,12 @@ fn go_on(
     frame: &Frame<'_>,
     raws: Found<'_>,
     constant: Option<f32>,
+    batch: &mut Batch,
     open: &mut [Open],
     aside: &mut Vec<(Segment, u32)>,
 ) {
     if !frame.wide {
-        go_on_by(frame.table, raws, constant, open, aside);
+        go_on_by(frame.table, raws, constant, batch, open, aside);
         return;
     }
     #[cfg(target_arch = "x86_64")]
@@ -408,15 +410,16 @@ fn go_on(
             table: &Table,
             raws: Found<'_>,
             constant: Option<f32>,
+            batch: &mut Batch,
             open: &mut [Open],
             aside: &mut Vec<(Segment, u32)>,
         ) {
-            go_on_by(table, raws, constant, open, aside);
+            go_on_by(table, raws, constant, batch, open, aside);
         }
         #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
         // SAFETY: `wide` is set only where these instructions were detected.
         unsafe {
-            wide(frame.table, raws, constant, open, aside);
+            wide(frame.table, raws, constant, batch, open, aside);
         }
     }
 }
@@ -426,21 +429,20 @@ fn go_on_by(
     table: &Table,
     raws: Found<'_>,
     constant: Option<f32>,
+    batch: &mut Batch,
     open: &mut [Open],
     aside: &mut Vec<(Segment, u32)>,
 ) {
     for first in (0..raws.len()).step_by(BATCH) {
-        let count = BATCH.min(raws.len() - first);
-        let (mut from, mut to, mut mm) = (Batch::of(0.0), Batch::of(0.0), Batch::of(0.0));
-        for n in 0..count {
-            let raw = raws.get(first + n);
-            [from.0[n], to.0[n]] = constant.map_or(raw.values, |value| [value; 2]);
-            mm.0[n] = length(raw.back - raw.front, open[raw.pixel as usize].stretch);
+        let raws = raws.part(first, BATCH);
+        for n in 0..raws.len() {
+            let raw = raws.get(n);
+            let values = constant.map_or(raw.values, |value| [value; 2]);
+            batch.set(n, values, length(raw.back - raw.front, open[raw.pixel as usize].stretch));
         }
-        let mut seen = Batch::of([0.0; 4]);
-        table.segments([&from, &to], &mm, &mut seen);
-        for (n, rgba) in seen.0.into_iter().enumerate().take(count) {
-            let raw = raws.get(first + n);
+        table.segments(batch, raws.len());
+        for n in 0..raws.len() {
+            let (raw, rgba) = (raws.get(n), batch.seen(n));
             let Open { run, aside: last, .. } = &mut open[raw.pixel as usize];
             if raw.front == run.back {
                 under(&mut run.rgba, rgba);

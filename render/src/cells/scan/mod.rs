@@ -148,9 +148,26 @@ pub(super) struct Found<'a> {
     pub(super) pixels: &'a [u32],
 }
 
-impl Found<'_> {
+impl<'a> Found<'a> {
     pub(super) fn len(&self) -> usize {
         self.pixels.len()
+    }
+
+    /// Up to `count` of it from the `first` on.
+    #[inline(always)]
+    pub(super) fn part(&self, first: usize, count: usize) -> Self {
+        #[inline(always)]
+        fn part<'a, T>(of: &'a [T], [from, to]: [usize; 2]) -> &'a [T] {
+            &of[from..to]
+        }
+        let range = [first, self.len().min(first + count)];
+        Self {
+            fronts: part(self.fronts, range),
+            backs: part(self.backs, range),
+            from: part(self.from, range),
+            to: part(self.to, range),
+            pixels: part(self.pixels, range),
+        }
     }
 
     #[inline(always)]

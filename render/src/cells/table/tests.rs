@@ -1,0 +1,183 @@
+use super::{BATCH, Batch, Table};
+use crate::volume::{ControlPoint, Transfer};
+
+fn transfer(points: &[[f64; 5]], unit_mm: f64) -> Transfer {
+    // Positions are of single precision: control points between two of them cannot be told from these.
+    let single = |value: f64| f64::from(value as f32);
+    let point = |&[value, r, g, b, a]: &[f64; 5]| ControlPoint { value: single(value), rgba: [r, g, b, a] };
+    Transfer::new(points.iter().map(point).collect(), unit_mm).expect("a function")
+}
+
+/// Functions that are hard each in its way, with values from 0 to 1.
+fn functions() -> Vec<(&'static str, Transfer)> {
+    let steps: Vec<[f64; 5]> = (0..8)
+        .flat_map(|i| [i, i + 1].map(|at| (at, f64::from(i))))
+        .map(|(at, i)| [f64::from(at) / 8.0, i / 7.0, 1.0 - i / 7.0, 0.5, 0.1 + 0.08 * i])
+        .collect();
+    let many: Vec<[f64; 5]> = (0..=255)
+        .map(|i| f64::from(i) / 255.0)
+        .map(|x| [x, x, (x * 9.0).sin().abs(), 1.0 - x, 0.3 * (x * 20.0).sin().powi(2)])
+        .collect();
+    vec![
+        ("even", transfer(&[[0.0, 0.2, 0.4, 0.6, 0.3], [1.0, 0.2, 0.4, 0.6, 0.3]], 1.0)),
+        ("one point", transfer(&[[0.0, 0.2, 0.4, 0.6, 0.3]], 1.0)),
+        (
+            "from nothing",
+            transfer(
+                &[
+                    [0.0, 0.1, 0.2, 0.9, 0.0],
+                    [0.05, 0.2, 0.8, 0.6, 0.02],
+                    [0.3, 0.9, 0.8, 0.2, 0.02],
+                    [1.0, 1.0, 0.2, 0.1, 0.2],
+                ],
+                1.0,
+            ),
+        ),
+        (
+            "to all but full opacity",
+            transfer(&[[0.0, 1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 1.0, 0.9999]], 2.0),
+        ),
+        (
+            "a narrow window",
+            transfer(
+                &[
+                    [0.0, 0.0, 0.0, 1.0, 0.0],
+                    [0.5, 0.0, 1.0, 0.0, 0.0],
+                    [0.5001, 1.0, 1.0, 1.0, 0.8],
+                    [0.5003, 1.0, 0.0, 0.0, 0.0],
+                    [1.0, 0.0, 1.0, 1.0, 0.01],
+                ],
+                1.0,
+            ),
+        ),
+        (
+            "a jump within",
+            transfer(
+                &[
+                    [0.0, 1.0, 0.0, 0.0, 0.05],
+                    [0.314_159, 1.0, 0.0, 0.0, 0.05],
+                    [0.314_159, 0.0, 0.0, 1.0, 0.8],
+                    [1.0, 0.0, 1.0, 0.0, 0.4],
+                ],
+                1.0,
+            ),
+        ),
+        (
+            "jumps at the ends",
+            transfer(
+                &[
+                    [0.0, 1.0, 0.0, 0.0, 0.0],
+                    [0.0, 0.0, 1.0, 0.0, 0.5],
+                    [1.0, 0.0, 1.0, 0.5, 0.5],
+                    [1.0, 0.0, 0.0, 1.0, 0.0],
+                ],
+                1.0,
+            ),
+        ),
+        ("steps", transfer(&steps, 1.0)),
+        ("many points", transfer(&many, 0.7)),
+    ]
+}
+
+/// What is seen, by sums over fine steps between the bends.
+fn truth(transfer: &Transfer, [from, to]: [f32; 2], mm: f32) -> [f64; 4] {
+    const STEPS: usize = 600;
+    let [from, to, mm] = [from, to, mm].map(f64::from);
+    let mut cuts = vec![0.0, 1.0];
+    if from != to {
+        cuts.extend(
+            transfer.points().iter().map(|p| (p.value - from) / (to - from)).filter(|t| *t > 0.0 && *t < 1.0),
+        );
+    }
+    cuts.sort_by(f64::total_cmp);
+    let mut seen = [0.0; 4];
+    for pair in cuts.windows(2) {
+        let step = (pair[1] - pair[0]) / STEPS as f64;
+        for n in 0..STEPS {
+            let at = from + (to - from) * (pair[0] + (n as f64 + 0.5) * step);
+            let (color, extinction) = transfer.classify(at);
+            let opacity = -(-extinction * mm * step).exp_m1();
+            let through = 1.0 - seen[3];
+            for (seen, color) in seen.iter_mut().zip(color.into_iter().chain([1.0])) {
+                *seen += through * color * opacity;
+            }
+        }
+    }
+    seen
+}
+
+/// From 0 to 1.
+fn random(state: &mut u64) -> f64 {
+    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    (*state >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// Segments of all lengths, many of them at and about control points.
+fn some(transfer: &Transfer, state: &mut u64) -> ([f32; 2], f32) {
+    let points = transfer.points();
+    let near = points[(random(state) * points.len() as f64) as usize].value;
+    let off = |state: &mut u64| (random(state) - 0.5) * 10_f64.powf(-7.0 * random(state));
+    let from = match (random(state) * 4.0) as u32 {
+        0 => near,
+        1 => near + off(state),
+        _ => random(state) * 1.4 - 0.2,
+    };
+    let to = match (random(state) * 4.0) as u32 {
+        0 => from,
+        1 => random(state) * 1.4 - 0.2,
+        _ => from + off(state),
+    };
+    ([from as f32, to as f32], 10_f64.powf(random(state) * 4.0 - 2.0) as f32)
+}
+
+fn at_once(table: &Table, segments: &[([f32; 2], f32)]) -> Vec<[f32; 4]> {
+    let mut batch = Batch::new();
+    for (n, &(ends, mm)) in segments.iter().enumerate() {
+        batch.set(n, ends, mm);
+    }
+    table.segments(&mut batch, segments.len());
+    (0..segments.len()).map(|n| batch.seen(n)).collect()
+}
+
+#[test]
+fn many_at_once_are_what_they_are_in_truth() {
+    let mut state = 7;
+    for (name, transfer) in functions() {
+        let table = Table::new(&transfer);
+        for _ in 0..60 {
+            let segments: Vec<_> = (0..BATCH).map(|_| some(&transfer, &mut state)).collect();
+            for (seen, &(ends, mm)) in at_once(&table, &segments).iter().zip(&segments) {
+                let truth = truth(&transfer, ends, mm);
+                let off = (0..4).map(|c| (f64::from(seen[c]) - truth[c]).abs()).fold(0.0, f64::max);
+                assert!(off * 255.0 < 0.2, "{name}, {ends:?}, {mm} mm: {seen:?}, not {truth:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_segment_is_the_same_in_any_company() {
+    let mut state = 11;
+    for (name, transfer) in functions() {
+        let table = Table::new(&transfer);
+        let segments: Vec<_> = (0..BATCH).map(|_| some(&transfer, &mut state)).collect();
+        let all = at_once(&table, &segments);
+        for (seen, &segment) in all.iter().zip(&segments) {
+            assert_eq!(at_once(&table, &[segment]), [*seen], "{name}, {segment:?}");
+        }
+    }
+}
+
+#[test]
+fn values_without_number_or_end_show_nothing_or_something() {
+    let transfer = transfer(&[[0.0, 1.0, 0.0, 0.0, 0.2], [1.0, 0.0, 1.0, 0.0, 0.4]], 1.0);
+    let table = Table::new(&transfer);
+    for ends in [[f32::NAN, 0.5], [0.5, f32::NAN], [f32::INFINITY, 0.5], [f32::NEG_INFINITY, f32::INFINITY]] {
+        let seen = at_once(&table, &[(ends, 1.0)]);
+        assert!(seen[0].iter().all(|v| (0.0..=1.0).contains(v)), "{ends:?}: {seen:?}");
+    }
+    let far = at_once(&table, &[([-1e6, -1e6 + 1.0], 2.0), ([1e6, 1e6 + 8.0], 2.0)]);
+    for (seen, through) in far.iter().zip([0.8_f32, 0.6]) {
+        assert!((1.0 - seen[3] - through * through).abs() < 1e-6, "constant outside: {seen:?}");
+    }
+}
