@@ -5,9 +5,9 @@
 //! Clusters are gone through, and runs of theirs composited, as workers do that share out the grid: the bytes are the same.
 //! Early termination is kept by each block for itself, with subscreens of its own.
 
-use std::sync::Mutex;
-use std::sync::PoisonError;
+use std::cmp::Reverse;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -19,10 +19,10 @@ use super::project::{Cluster, Frame, Projector};
 use super::scan::Rect;
 use super::stats::Counts;
 use super::worker::{Gathered, Manner, Row};
-use super::{CellsError, MAX_WORKERS};
+use super::CellsError;
 
 /// Pixels that a block is wide and high.
-static BLOCKS: std::sync::LazyLock<usize> = std::sync::LazyLock::new(|| std::env::var("BLK").map_or(64, |v| v.parse().unwrap()));
+const BLOCK: usize = 64;
 
 /// A cluster that may show.
 #[derive(Debug)]
@@ -83,7 +83,20 @@ struct Desk<'a> {
     counts: Counts,
 }
 
-impl Desk<'_> {
+impl<'a> Desk<'a> {
+    fn new(frame: &'a Frame<'a>, manner: Manner, near: &'a [Near]) -> Self {
+        Self {
+            frame,
+            manner,
+            near,
+            projector: Projector::default(),
+            lists: Lists::new(0),
+            known: Vec::new(),
+            list: Vec::new(),
+            counts: Counts::default(),
+        }
+    }
+
     /// Draws a block; `near` are places of clusters.
     fn draw(&mut self, rect: &Rect, near: &[u32]) -> Vec<Row> {
         let Self { frame, manner, projector, lists, known, counts, .. } = self;
@@ -127,76 +140,87 @@ impl Desk<'_> {
     }
 }
 
-/// Draws a picture with `workers` threads at most.
+/// A block of pixels, and which clusters may show in it, nearest first.
+struct Block {
+    rect: Rect,
+    near: Vec<u32>,
+}
+
+/// All blocks, row by row; and how many there are in a row.
+fn blocks(frame: &Frame<'_>, near: &[Near]) -> (Vec<Block>, usize) {
+    let picture = frame.rect();
+    let [across, down] = frame.size.map(|n| (n as usize).div_ceil(BLOCK));
+    let mut blocks = Vec::with_capacity(across * down);
+    for y in 0..down {
+        for x in 0..across {
+            let low = [x, y].map(|n| (n * BLOCK) as i32);
+            let rect = Rect { low, high: low.map(|v| v + BLOCK as i32) }.meet(&picture);
+            blocks.push(Block { rect, near: Vec::new() });
+        }
+    }
+    for (place, near) in near.iter().enumerate() {
+        let [x0, y0] = near.reach.low.map(|v| v as usize / BLOCK);
+        let [x1, y1] = near.reach.high.map(|v| (v - 1) as usize / BLOCK);
+        for y in y0..=y1 {
+            for block in &mut blocks[y * across + x0..=y * across + x1] {
+                block.near.push(place as u32);
+            }
+        }
+    }
+    (blocks, across)
+}
+
+/// What threads have drawn: rows of blocks, with the blocks' numbers; and what each of them did.
+#[derive(Default)]
+struct Drawn {
+    rows: Vec<(usize, Vec<Row>)>,
+    counts: Vec<Counts>,
+}
+
+/// Draws a picture with `workers` threads of the current pool at most.
 pub(super) fn run(
     frame: &Frame<'_>,
     manner: Manner,
     workers: usize,
     progress: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Result<Gathered, CellsError> {
-    let [width, height] = frame.size.map(|n| n as usize);
     let (near, skipped) = in_view(frame);
-    let across = width.div_ceil(*BLOCKS);
-    let mut blocks: Vec<(Rect, Vec<u32>)> = Vec::new();
-    for (y, x) in (0..height.div_ceil(*BLOCKS)).flat_map(|y| (0..across).map(move |x| (y, x))) {
-        let low = [x * *BLOCKS, y * *BLOCKS];
-        let high = [(low[0] + *BLOCKS).min(width), (low[1] + *BLOCKS).min(height)];
-        blocks.push((Rect { low: low.map(|v| v as i32), high: high.map(|v| v as i32) }, Vec::new()));
-    }
-    for (place, near) in near.iter().enumerate() {
-        let [x0, y0] = near.reach.low.map(|v| v as usize / *BLOCKS);
-        let [x1, y1] = near.reach.high.map(|v| (v as usize - 1) / *BLOCKS);
-        for (y, x) in (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| (y, x))) {
-            blocks[y * across + x].1.push(place as u32);
-        }
-    }
+    let (blocks, across) = blocks(frame, &near);
     // Those with most to do first, so that no thread is left with a long one in the end.
     let mut order: Vec<usize> = (0..blocks.len()).collect();
-    order.sort_by_key(|&block| std::cmp::Reverse(blocks[block].1.len()));
-    let next = AtomicUsize::new(0);
+    order.sort_by_key(|&block| Reverse(blocks[block].near.len()));
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let cancelled = AtomicBool::new(false);
-    let drawn: Mutex<(Vec<(usize, Vec<Row>)>, Vec<Counts>)> = Mutex::default();
+    let drawn = Mutex::new(Drawn::default());
     let work = || {
-        let mut desk = Desk {
-            frame,
-            manner,
-            near: &near,
-            projector: Projector::default(),
-            lists: Lists::new(*BLOCKS * *BLOCKS),
-            known: Vec::new(),
-            list: Vec::new(),
-            counts: Counts::default(),
-        };
+        let mut desk = Desk::new(frame, manner, &near);
         let mut mine = Vec::new();
         while let Some(&block) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let (rect, near) = &blocks[block];
+            let Block { rect, near } = &blocks[block];
             mine.push((block, desk.draw(rect, near)));
-            if !progress(next.load(Ordering::Relaxed).min(order.len()), order.len()) {
-                cancelled.store(true, Ordering::Relaxed);
-            }
-            if cancelled.load(Ordering::Relaxed) {
+            let goes_on = progress(done.fetch_add(1, Ordering::Relaxed) + 1, order.len());
+            if cancelled.fetch_or(!goes_on, Ordering::Relaxed) || !goes_on {
                 return;
             }
         }
         let mut drawn = drawn.lock().unwrap_or_else(PoisonError::into_inner);
-        drawn.0.extend(mine);
-        drawn.1.push(desk.counts);
+        drawn.rows.append(&mut mine);
+        drawn.counts.push(desk.counts);
     };
     rayon::scope(|scope| {
-        for _ in 0..workers.min(MAX_WORKERS) {
+        for _ in 0..workers {
             scope.spawn(|_| work());
         }
     });
     if cancelled.into_inner() {
         return Err(CellsError::Cancelled);
     }
-    let (mut drawn, mut counts) = drawn.into_inner().unwrap_or_else(PoisonError::into_inner);
-    // Blocks of one row of them stand side by side.
+    let Drawn { rows: mut drawn, mut counts } = drawn.into_inner().unwrap_or_else(PoisonError::into_inner);
+    // Then blocks that stand side by side come one behind the other.
     drawn.sort_unstable_by_key(|&(block, _)| block);
-    let mut rows = vec![Row::default(); height];
+    let mut rows = vec![Row::default(); frame.size[1] as usize];
     for (block, part) in drawn {
-        let top = block / across * *BLOCKS;
-        for (row, more) in rows[top..].iter_mut().zip(part) {
+        for (row, more) in rows[block / across * BLOCK..].iter_mut().zip(part) {
             row.append(more);
         }
     }

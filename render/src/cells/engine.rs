@@ -2,29 +2,24 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use super::CellsError;
 use super::link::{Link, LinkError, Post};
 use super::project::Frame;
+use super::spread::{Spread, queues};
 use super::worker::{Gathered, Manner, Start, Step, Worker};
+use super::{CellsError, blocks};
 
-/// What drives workers.
+/// How a picture is shared out among the threads of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Engine {
-    /// None: threads share out the picture instead of the grid, which all of them have at hand. `spread`, `balance` and
-    /// `share` are not looked at.
+    /// By blocks of pixels: threads of the current pool draw one after the other. `spread`, `balance` and `share` are not
+    /// looked at.
     #[default]
     Blocks,
-    /// A thread each.
+    /// By cells, as among processes: workers, a thread each, have parts of the grid and exchange what they make of them.
     Threads,
-    /// All in turn on the calling thread, each with a clock that its work moves on; the one that is furthest behind goes
+    /// The same with all workers in turn on the calling thread, each with a clock that its work moves on; the one that is furthest behind goes
     /// next. For measuring how work is shared out among more workers than there are cores.
     Simulated,
-}
-
-/// Clusters of each worker, and what is told of progress.
-pub(super) struct Jobs<'a> {
-    pub(super) queues: Vec<Vec<u32>>,
-    pub(super) progress: &'a (dyn Fn(usize, usize) -> bool + Sync),
 }
 
 /// One worker, until it is done.
@@ -43,30 +38,33 @@ pub(super) fn run<L: Link>(
 }
 
 impl Engine {
-    /// Runs all workers; what the first has gathered.
+    /// Draws with `count` workers.
     pub(super) fn run(
         self,
         frame: &Frame<'_>,
         manner: Manner,
-        jobs: Jobs<'_>,
+        (count, spread): (usize, Spread),
+        progress: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> Result<Gathered, CellsError> {
-        let total = jobs.queues.iter().map(Vec::len).sum::<usize>();
-        let left: Vec<u32> = jobs.queues.iter().map(|q| q.len() as u32).collect();
-        let post = Post::new(jobs.queues.len());
-        let workers = jobs.queues.into_iter().enumerate();
+        if self == Self::Blocks {
+            return blocks::run(frame, manner, count, progress);
+        }
+        let queues = queues(frame, count, spread);
+        let total = queues.iter().map(Vec::len).sum::<usize>();
+        let left: Vec<u32> = queues.iter().map(|q| q.len() as u32).collect();
+        let post = Post::new(queues.len());
+        let workers = queues.into_iter().enumerate();
         let mut workers: Vec<_> = workers
             .map(|(rank, queue)| {
                 let start = Start { queue, left: left.clone(), homes: &[] };
                 Worker::new(frame, manner, post.link(rank), start)
             })
             .collect();
-        match self {
-            Self::Threads => threads(workers, &post, total, jobs.progress),
-            Self::Blocks | Self::Simulated => {
-                simulate(&mut workers, &post, total, jobs.progress)?;
-                workers.into_iter().next().map(Worker::into_gathered).ok_or(CellsError::Workers)
-            }
+        if self == Self::Threads {
+            return threads(workers, &post, total, progress);
         }
+        simulate(&mut workers, &post, total, progress)?;
+        workers.into_iter().next().map(Worker::into_gathered).ok_or(CellsError::Workers)
     }
 }
 

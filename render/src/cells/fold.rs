@@ -70,21 +70,27 @@ pub(super) fn under(seen: &mut [f32; 4], behind: [f32; 4]) {
 /// Puts what a ray has of cells in order of depth, the same for any order it was found in.
 #[inline(always)]
 pub(super) fn sort(raws: &mut [Raw]) {
-    if raws.len() > FEW {
-        raws.sort_unstable_by(|a, b| {
+    sort_by(raws, is_before);
+}
+
+/// Puts a list in order, of which much is in order already.
+#[inline(always)]
+fn sort_by<T: Copy>(list: &mut [T], is_before: impl Fn(&T, &T) -> bool) {
+    if list.len() > FEW {
+        list.sort_unstable_by(|a, b| {
             let before = |a, b| if is_before(a, b) { Ordering::Less } else { Ordering::Equal };
             before(a, b).then_with(|| before(b, a).reverse())
         });
         return;
     }
-    for i in 1..raws.len() {
-        let raw = raws[i];
+    for i in 1..list.len() {
+        let one = list[i];
         let mut at = i;
-        while at > 0 && is_before(&raw, &raws[at - 1]) {
-            raws[at] = raws[at - 1];
+        while at > 0 && is_before(&one, &list[at - 1]) {
+            list[at] = list[at - 1];
             at -= 1;
         }
-        raws[at] = raw;
+        list[at] = one;
     }
 }
 
@@ -185,7 +191,7 @@ pub(super) fn composite(
     list.reverse();
     // What comes one behind the other is in order.
     if overlap(list) {
-        list.sort_unstable_by(Segment::order);
+        sort_by(list, |a, b| if a.front == b.front { a.order(b).is_lt() } else { a.front < b.front });
         if overlap(list) {
             counts.overlapping_pixels += 1;
             add_up(list);

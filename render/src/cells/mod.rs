@@ -77,10 +77,8 @@ use crate::simd::has_wide;
 use crate::view::View;
 use crate::volume::cells::{CellGrid, Scalar};
 use clusters::{Clusters, Scalars};
-use engine::Jobs;
 use lens::Lens;
 use project::Frame;
-use spread::queues;
 use table::Table;
 use worker::{Gathered, Manner};
 
@@ -97,7 +95,7 @@ pub struct Options {
     pub early: Option<Early>,
     /// How many workers; where none is said, one for each thread of the current pool.
     pub workers: Option<usize>,
-    /// What drives them.
+    /// How they share out the picture.
     pub engine: Engine,
     /// Which cells each worker begins with.
     pub spread: Spread,
@@ -250,12 +248,7 @@ impl CellRenderer {
         if count == 0 || count > MAX_WORKERS {
             return Err(CellsError::Workers);
         }
-        let gathered = if options.engine == Engine::Blocks {
-            blocks::run(&frame, manner, count, progress)?
-        } else {
-            let jobs = Jobs { queues: queues(&frame, count, options.spread), progress };
-            options.engine.run(&frame, manner, jobs)?
-        };
+        let gathered = options.engine.run(&frame, manner, (count, options.spread), progress)?;
         Ok(ready.picture(gathered, options))
     }
 
