@@ -21,8 +21,10 @@ use super::stats::Counts;
 use super::worker::{Gathered, Manner, Row};
 use super::CellsError;
 
-/// Pixels that a block is wide and high.
-const BLOCK: usize = 64;
+/// Pixels that a block is wide and high: at most, and where the picture is too small for [`EACH`] at least.
+const BLOCK: [usize; 2] = [64, 8];
+/// Blocks for each thread, so that all are done at about the same time.
+const EACH: usize = 8;
 
 /// A cluster that may show.
 #[derive(Debug)]
@@ -93,12 +95,12 @@ impl<'a> Desk<'a> {
             lists: Lists::new(0),
             known: Vec::new(),
             list: Vec::new(),
-            counts: Counts::default(),
+            counts: Counts { held: frame.clusters.held(), ..Counts::default() },
         }
     }
 
-    /// Draws a block; `near` are places of clusters.
-    fn draw(&mut self, rect: &Rect, near: &[u32]) -> Vec<Row> {
+    /// Draws a block, as long as `goes_on`, which is asked for each cluster.
+    fn draw(&mut self, Block { rect, near }: &Block, goes_on: impl Fn() -> bool) -> Option<Vec<Row>> {
         let Self { frame, manner, projector, lists, known, counts, .. } = self;
         let early = manner.early.map(|early| early.threshold as f32);
         lists.reset(rect.area());
@@ -108,6 +110,7 @@ impl<'a> Desk<'a> {
         known.resize(if early.is_some() { rect.area() } else { 0 }, (1.0, 0.0));
         for &place in near {
             let of = &self.near[place as usize];
+            counts.clusters += 1;
             let mut stale = Vec::new();
             projector.draw(frame, of.cluster(), rect, table.as_ref(), counts, |pixel, run| {
                 lists.add(pixel, run);
@@ -125,8 +128,11 @@ impl<'a> Desk<'a> {
                 }
                 table.refresh();
             }
+            if !goes_on() {
+                return None;
+            }
         }
-        (0..height).map(|y| self.row(y * width, width)).collect()
+        Some((0..height).map(|y| self.row(y * width, width)).collect())
     }
 
     /// Composites the pixels of a row of a block, which begins with `first`.
@@ -146,28 +152,40 @@ struct Block {
     near: Vec<u32>,
 }
 
-/// All blocks, row by row; and how many there are in a row.
-fn blocks(frame: &Frame<'_>, near: &[Near]) -> (Vec<Block>, usize) {
-    let picture = frame.rect();
-    let [across, down] = frame.size.map(|n| (n as usize).div_ceil(BLOCK));
-    let mut blocks = Vec::with_capacity(across * down);
-    for y in 0..down {
-        for x in 0..across {
-            let low = [x, y].map(|n| (n * BLOCK) as i32);
-            let rect = Rect { low, high: low.map(|v| v + BLOCK as i32) }.meet(&picture);
-            blocks.push(Block { rect, near: Vec::new() });
+/// The blocks of a picture, row by row.
+struct Blocks {
+    side: usize,
+    across: usize,
+    list: Vec<Block>,
+}
+
+impl Blocks {
+    fn new(frame: &Frame<'_>, near: &[Near], workers: usize) -> Self {
+        let count = |side: usize| frame.size.map(|n| (n as usize).div_ceil(side));
+        let mut side = BLOCK[0];
+        while side > BLOCK[1] && count(side).into_iter().product::<usize>() < EACH * workers {
+            side /= 2;
         }
-    }
-    for (place, near) in near.iter().enumerate() {
-        let [x0, y0] = near.reach.low.map(|v| v as usize / BLOCK);
-        let [x1, y1] = near.reach.high.map(|v| (v - 1) as usize / BLOCK);
-        for y in y0..=y1 {
-            for block in &mut blocks[y * across + x0..=y * across + x1] {
-                block.near.push(place as u32);
+        let [across, down] = count(side);
+        let mut list = Vec::with_capacity(across * down);
+        for y in 0..down {
+            for x in 0..across {
+                let low = [x, y].map(|n| (n * side) as i32);
+                let rect = Rect { low, high: low.map(|v| v + side as i32) }.meet(&frame.rect());
+                list.push(Block { rect, near: Vec::new() });
             }
         }
+        for (place, near) in near.iter().enumerate() {
+            let [x0, y0] = near.reach.low.map(|v| v as usize / side);
+            let [x1, y1] = near.reach.high.map(|v| (v - 1) as usize / side);
+            for y in y0..=y1 {
+                for block in &mut list[y * across + x0..=y * across + x1] {
+                    block.near.push(place as u32);
+                }
+            }
+        }
+        Self { side, across, list }
     }
-    (blocks, across)
 }
 
 /// What threads have drawn: rows of blocks, with the blocks' numbers; and what each of them did.
@@ -185,23 +203,26 @@ pub(super) fn run(
     progress: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Result<Gathered, CellsError> {
     let (near, skipped) = in_view(frame);
-    let (blocks, across) = blocks(frame, &near);
+    let Blocks { side, across, list: blocks } = Blocks::new(frame, &near, workers);
     // Those with most to do first, so that no thread is left with a long one in the end.
     let mut order: Vec<usize> = (0..blocks.len()).collect();
     order.sort_by_key(|&block| Reverse(blocks[block].near.len()));
+    let total: usize = blocks.iter().map(|block| block.near.len()).sum();
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let cancelled = AtomicBool::new(false);
+    let goes_on = || {
+        if !progress((done.fetch_add(1, Ordering::Relaxed) + 1).min(total), total) {
+            cancelled.store(true, Ordering::Relaxed);
+        }
+        !cancelled.load(Ordering::Relaxed)
+    };
     let drawn = Mutex::new(Drawn::default());
     let work = || {
         let mut desk = Desk::new(frame, manner, &near);
         let mut mine = Vec::new();
         while let Some(&block) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let Block { rect, near } = &blocks[block];
-            mine.push((block, desk.draw(rect, near)));
-            let goes_on = progress(done.fetch_add(1, Ordering::Relaxed) + 1, order.len());
-            if cancelled.fetch_or(!goes_on, Ordering::Relaxed) || !goes_on {
-                return;
-            }
+            let Some(rows) = desk.draw(&blocks[block], goes_on) else { return };
+            mine.push((block, rows));
         }
         let mut drawn = drawn.lock().unwrap_or_else(PoisonError::into_inner);
         drawn.rows.append(&mut mine);
@@ -220,7 +241,7 @@ pub(super) fn run(
     drawn.sort_unstable_by_key(|&(block, _)| block);
     let mut rows = vec![Row::default(); frame.size[1] as usize];
     for (block, part) in drawn {
-        for (row, more) in rows[block / across * BLOCK..].iter_mut().zip(part) {
+        for (row, more) in rows[block / across * side..].iter_mut().zip(part) {
             row.append(more);
         }
     }

@@ -7,11 +7,11 @@ pub struct Counts {
     pub outside: u64,
     /// Tetrahedra that the transfer function makes clear.
     pub clear: u64,
-    /// Tetrahedra that lie behind what is opaque enough.
+    /// Tetrahedra that lie behind what is opaque enough; by blocks, once in each.
     pub hidden: u64,
     /// Tetrahedra with a value or a place in the picture that is not a number; left out.
     pub not_finite: u64,
-    /// Tetrahedra scan-converted.
+    /// Tetrahedra scan-converted; by blocks, once in each.
     pub scanned: u64,
     /// Segments that came of them: pixels times cells.
     pub segments: u64,
@@ -29,7 +29,7 @@ pub struct Counts {
     pub messages: u64,
     /// Clusters taken over from other workers.
     pub taken: u64,
-    /// Clusters drawn.
+    /// Clusters drawn; by blocks, once in each.
     pub clusters: u64,
     /// Tetrahedra that the worker's process has in memory; all of the grid where workers share it.
     pub held: u64,

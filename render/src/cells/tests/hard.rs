@@ -193,10 +193,10 @@ fn what_cannot_be_drawn_is_said() {
 fn drawing_stops_when_told_to() {
     let grid = grid(&lattice(10, 0.2, 6), |_, p| p.x / 10.0);
     let item = item(&grid, varied(0.5));
-    for engine in [Engine::Threads, Engine::Simulated] {
+    for engine in [Engine::Blocks, Engine::Threads, Engine::Simulated] {
         let options = Options { engine, workers: Some(3), ..Options::default() };
         let camera = looks([20.0, -15.0, 15.0], [5.0; 3], Projection::Perspective { fov_rad: 0.6 });
-        let stopped = CellRenderer::new().render(&item, &camera, SIZE, &options, &|done, _| done < 4);
+        let stopped = CellRenderer::new().render(&item, &camera, SIZE, &options, &|done, _| done < 2);
         assert_eq!(stopped, Err(CellsError::Cancelled), "{engine:?}");
     }
 }

@@ -85,7 +85,8 @@ fn tables(
     let mut least = vec![(f64::INFINITY, 0.0); all.len()];
     for turn in 0..=TURNS {
         for ((_, _, early), (least, scanned)) in all.iter().zip(&mut least) {
-            let options = Options { early: *early, workers: Some(1), ..Options::default() };
+            let (workers, engine) = (Some(1), Engine::Threads);
+            let options = Options { early: *early, workers, engine, ..Options::default() };
             let stats = draw(renderer, item, camera, size, &options)?.stats;
             if turn > 0 {
                 *least = least.min(stats.frame_ms);

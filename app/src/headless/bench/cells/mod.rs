@@ -95,7 +95,8 @@ fn levels(
     for workers in WORKERS {
         let options = LEVELS.map(|(_, early, share, balance)| {
             let workers = Some(workers);
-            Options { early, share, balance, workers, spread: Spread::Blocks, ..Options::default() }
+            let (spread, engine) = (Spread::Blocks, Engine::Threads);
+            Options { early, share, balance, workers, engine, spread, ..Options::default() }
         });
         let mut least = [f64::INFINITY; LEVELS.len()];
         for turn in 0..=TURNS {
