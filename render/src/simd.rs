@@ -16,9 +16,7 @@ pub(crate) fn has_wide() -> bool {
 }
 
 /// Four numbers, each rounded as one alone is: all kinds give the same bits.
-pub(crate) trait Four:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
-{
+pub(crate) trait Four: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// The same four times.
     fn all(v: f64) -> Self;
     fn from_array(v: [f64; 4]) -> Self;
@@ -168,14 +166,18 @@ impl Four for Plain {
 pub(crate) use wide::Wide;
 
 #[cfg(target_arch = "x86_64")]
-#[expect(unsafe_code, reason = "instructions that the machine has to be asked for")]
+#[expect(
+    unsafe_code,
+    clippy::undocumented_unsafe_blocks,
+    reason = "instructions that the machine has to be asked for; one comment is about all of it"
+)]
 mod wide {
     use std::arch::x86_64::{
         __m256d, _CMP_LT_OQ, _mm_loadu_si128, _mm_permutevar_ps, _mm_storeu_ps, _mm256_add_pd, _mm256_and_pd,
-        _mm256_castpd_ps, _mm256_castps_pd, _mm256_castsi256_pd, _mm256_cmp_pd, _mm256_cvtpd_ps, _mm256_div_pd,
-        _mm256_loadu_pd, _mm256_loadu_si256, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd,
-        _mm256_permute4x64_pd, _mm256_permutevar8x32_ps, _mm256_set1_epi64x, _mm256_set1_pd, _mm256_storeu_pd,
-        _mm256_sub_pd,
+        _mm256_castpd_ps, _mm256_castps_pd, _mm256_castsi256_pd, _mm256_cmp_pd, _mm256_cvtpd_ps,
+        _mm256_div_pd, _mm256_loadu_pd, _mm256_loadu_si256, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd,
+        _mm256_mul_pd, _mm256_permute4x64_pd, _mm256_permutevar8x32_ps, _mm256_set1_epi64x, _mm256_set1_pd,
+        _mm256_storeu_pd, _mm256_sub_pd,
     };
     use std::ops::{Add, Mul, Sub};
 

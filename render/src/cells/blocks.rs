@@ -11,6 +11,7 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use super::CellsError;
 use super::early;
 use super::fold::{Segment, composite};
 use super::in_view::{InView, Shown};
@@ -19,7 +20,6 @@ use super::project::{Cluster, Frame, Projector};
 use super::scan::Rect;
 use super::stats::Counts;
 use super::worker::{Gathered, Manner, Row};
-use super::CellsError;
 
 /// Pixels that a block is wide and high: at most, and where the picture is too small for [`EACH`] at least.
 const BLOCK: [usize; 2] = [64, 8];
@@ -139,7 +139,13 @@ impl<'a> Desk<'a> {
     fn row(&mut self, first: usize, width: usize) -> Row {
         let mut row = Row::default();
         for pixel in first..first + width {
-            let color = composite(&self.lists, pixel, &mut self.list, self.manner.keep.then_some(&mut row), &mut self.counts);
+            let color = composite(
+                &self.lists,
+                pixel,
+                &mut self.list,
+                self.manner.keep.then_some(&mut row),
+                &mut self.counts,
+            );
             row.colors.push(color);
         }
         row

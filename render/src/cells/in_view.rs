@@ -31,7 +31,13 @@ pub(super) struct InView {
 
 impl InView {
     /// Brings a cluster before the camera; counts what cannot show. What is in it is forgotten; `scratch` is for reuse.
-    pub(super) fn fill(&mut self, frame: &Frame<'_>, cluster: usize, scratch: &mut Vec<Shown>, counts: &mut Counts) {
+    pub(super) fn fill(
+        &mut self,
+        frame: &Frame<'_>,
+        cluster: usize,
+        scratch: &mut Vec<Shown>,
+        counts: &mut Counts,
+    ) {
         if !frame.wide {
             self.fill_by(frame, cluster, scratch, counts);
             return;
@@ -60,13 +66,14 @@ impl InView {
     fn fill_by(&mut self, frame: &Frame<'_>, cluster: usize, scratch: &mut Vec<Shown>, counts: &mut Counts) {
         let of_points = frame.scalars.place() == Place::Points;
         let raw = frame.scalars.of(cluster);
-        let points = frame.clusters.points(cluster).iter().enumerate();
+        let points = frame.clusters.points(cluster).iter();
         self.corners.clear();
         self.constants.clear();
         if of_points {
-            self.corners.extend(points.map(|(i, p)| frame.lens.corner(p, frame.table.position(raw[i]))));
+            let points = points.zip(raw);
+            self.corners.extend(points.map(|(p, &v)| frame.lens.corner(p, frame.table.position(v))));
         } else {
-            self.corners.extend(points.map(|(_, p)| frame.lens.corner(p, 0.0)));
+            self.corners.extend(points.map(|p| frame.lens.corner(p, 0.0)));
             self.constants.extend(raw.iter().map(|&v| frame.table.position(v) as f32));
         }
         self.choose(frame, cluster, scratch, counts);

@@ -4,17 +4,19 @@
 //!
 //! 1. `split`, `clusters`: cells become tetrahedra, the same across a shared face, in clusters of a few hundred near ones.
 //!    That is done once a grid.
-//! 2. `lens`, `scan`: each tetrahedron is projected and scan-converted: for every pixel whose ray passes it, where the ray
-//!    enters and leaves it, and the scalar there. Exact predicates decide which rays those are, and neighbours agree to the
-//!    bit about depth and scalar on the face that they share: no ray passes between two cells or through both at once.
-//! 3. `table`, `fold`: each stretch is integrated for a scalar that runs linearly and the transfer function as it is; a
+//! 2. `lens`, `in_view`: corners are projected, and cells that may show put roughly in order of depth. That is done once a
+//!    picture.
+//! 3. `scan`: each tetrahedron is scan-converted: for every pixel whose ray passes it, where the ray enters and leaves it, and
+//!    the scalar there. Exact predicates decide near edges which rays those are, and neighbours agree to the bit about depth
+//!    on the face that they share: no ray passes between two cells or through both at once.
+//! 4. `table`, `fold`: each stretch is integrated for a scalar that runs linearly and the transfer function as it is; a
 //!    cluster's stretches are merged in each pixel where they meet, and put in order.
-//! 4. `lists`, `early`: each worker keeps a list of [`Segment`]s for each pixel; clusters and cells behind what is opaque are
-//!    left out, if asked for ([`Early`]).
-//! 5. `worker`, `wire`, `link`, `engine`: workers share out clusters and exchange lists, by messages ([`Link`]); then the
-//!    lists are composited in order of depth. Grids may be of several parts, not convex, and cells may lie in a circle before
-//!    each other.
-//! 6. `group`, `serve`, `orders`: the same workers as processes, each with no more than its part of the grid ([`Group`]); over
+//! 5. `lists`, `early`: for each pixel there is a list of [`Segment`]s, which is composited in order of depth in the end;
+//!    clusters and cells behind what is opaque are left out, if asked for ([`Early`]). Grids may be of several parts, not
+//!    convex, and cells may lie in a circle before each other.
+//! 6. Who does so, by [`Engine`]: `blocks`, threads that share out the picture, all of which have the whole grid; or
+//!    `worker`, `wire`, `link`, workers that share out clusters and exchange lists, by messages ([`Link`]), as the paper has it.
+//! 7. `group`, `serve`, `orders`: the same workers as processes, each with no more than its part of the grid ([`Group`]); over
 //!    MPI where the feature `mpi` is on.
 //!
 //! **Meaning**: that of `crate::reference`. The scalar is linear within each tetrahedron; fields of cells are constant
@@ -25,8 +27,9 @@
 //! **Error**: below 1/255 in any channel; the parts that it is made of are said in `table`. With early termination, at most
 //! 1 - [`Early::threshold`] is added.
 //!
-//! **Same bytes**: without early termination the picture and the segments do not depend on the number of workers, on the
-//! order of the grid's cells, or on the processor's instructions. With it they depend on the workers' timing, within its bound.
+//! **Same bytes**: without early termination the picture and the segments do not depend on how the work is shared out and
+//! among how many, on the order of the grid's cells, or on the processor's instructions. With it they depend on the workers'
+//! timing, within its bound; by blocks on their size alone.
 
 mod among;
 mod blocks;

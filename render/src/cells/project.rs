@@ -270,7 +270,9 @@ impl Projector {
             let index = shown.tetrahedron as usize;
             let corners = tetrahedra[index].map(|v| &of.view.corners[v as usize]);
             let constant = of.view.constants.get(index).copied();
-            scan::<F>(corners, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut |raws| go_on(raws, constant));
+            scan::<F>(corners, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut |raws| {
+                go_on(raws, constant)
+            });
             if constant.is_some() {
                 go_on(self.gathered.take(), constant);
             }

@@ -107,7 +107,6 @@ pub(super) struct Raw {
     pub(super) pixel: u32,
 }
 
-
 /// Corners of a face, and for each the edge across from it.
 const FACES: [([usize; 3], [usize; 3]); 4] =
     [([1, 2, 3], [5, 4, 3]), ([0, 2, 3], [5, 2, 1]), ([0, 1, 3], [4, 2, 0]), ([0, 1, 2], [3, 1, 0])];
@@ -148,7 +147,7 @@ pub(super) struct Found<'a> {
     pub(super) pixels: &'a [u32],
 }
 
-impl<'a> Found<'a> {
+impl Found<'_> {
     pub(super) fn len(&self) -> usize {
         self.pixels.len()
     }
@@ -156,17 +155,13 @@ impl<'a> Found<'a> {
     /// Up to `count` of it from the `first` on.
     #[inline(always)]
     pub(super) fn part(&self, first: usize, count: usize) -> Self {
-        #[inline(always)]
-        fn part<'a, T>(of: &'a [T], [from, to]: [usize; 2]) -> &'a [T] {
-            &of[from..to]
-        }
-        let range = [first, self.len().min(first + count)];
+        let last = self.len().min(first + count);
         Self {
-            fronts: part(self.fronts, range),
-            backs: part(self.backs, range),
-            from: part(self.from, range),
-            to: part(self.to, range),
-            pixels: part(self.pixels, range),
+            fronts: &self.fronts[first..last],
+            backs: &self.backs[first..last],
+            from: &self.from[first..last],
+            to: &self.to[first..last],
+            pixels: &self.pixels[first..last],
         }
     }
 

@@ -95,7 +95,8 @@ impl<F: Four> Faces<F> {
         let (deep, length) = (u[2].abs() + v[2].abs(), nx.abs() + ny.abs());
         let narrow = (nz.abs() * deep).below(length * F::all(NARROW));
         // Where a corner has no rank, c is not a number.
-        let known = (size_z * F::all(CANCELLED)).below(nz.abs()) & c.abs().below(F::all(f64::INFINITY)) & !narrow;
+        let known =
+            (size_z * F::all(CANCELLED)).below(nz.abs()) & c.abs().below(F::all(f64::INFINITY)) & !narrow;
         let (normal, size) = ([nx, ny, nz], [size_x, size_y, size_z]);
         Self { places: [x, y, z], a, b, c, normal, size, part, known }
     }
@@ -183,10 +184,10 @@ impl Cell {
         let [nx, ny, nz] = faces.normal.map(F::to_array);
         let volume = ((x[1] - x[0]) * nx[1] + (y[1] - y[0]) * ny[1]) + (z[1] - z[0]) * nz[1];
         let spread = [spread(x), spread(y), spread(z)];
-        let before = (corners[0].z >= 0.0) & (corners[1].z >= 0.0) & (corners[2].z >= 0.0) & (corners[3].z >= 0.0);
+        let nearest = corners[0].z.min(corners[1].z).min(corners[2].z.min(corners[3].z));
         // Written so that what is not a number is not plain.
-        let full = (volume.abs() >= FLAT * (spread[0] * spread[1] * spread[2])) & volume.is_finite();
-        if !(before & full) {
+        let full = volume.abs() >= FLAT * (spread[0] * spread[1] * spread[2]) && volume.is_finite();
+        if !(nearest >= 0.0 && full) {
             return None;
         }
         let turned = if volume < 0.0 { ALL & !EVEN } else { EVEN };
@@ -203,7 +204,8 @@ impl Cell {
         if planes.known != ALL {
             let normal = [nx, ny, nz];
             let size = faces.size.map(F::to_array);
-            (near, unsure) = steep(&mut planes, [[x, y, z], normal, size], [volume, spread[2]], wrong, near)?;
+            let of = [[x, y, z], normal, size];
+            (near, unsure) = steep(&mut planes, &of, [volume, spread[2]], wrong, near)?;
         }
         if near == 0 || near == ALL {
             return None;
@@ -243,7 +245,11 @@ impl Cell {
 
     /// Where the rays of the group from pixel i of a row on pass, `NEAR` of the faces being near.
     #[inline(always)]
-    pub(super) fn pass<F: Four, const NEAR: usize, const PERSPECTIVE: bool>(&self, row: &Row, i: i32) -> Passed<F> {
+    pub(super) fn pass<F: Four, const NEAR: usize, const PERSPECTIVE: bool>(
+        &self,
+        row: &Row,
+        i: i32,
+    ) -> Passed<F> {
         let x = F::all(f64::from(i)) + F::from_array([0.0, 1.0, 2.0, 3.0]);
         let rank = |face: usize| F::all(row.ranks[face]) + F::all(self.a[face]) * x;
         let ranks = [rank(0), rank(1), rank(2), rank(3)];
@@ -313,7 +319,7 @@ pub(super) struct Passed<F> {
 #[inline(never)]
 fn steep(
     planes: &mut Planes,
-    of: [[[f64; 4]; 3]; 3],
+    of: &[[[f64; 4]; 3]; 3],
     extent: [f64; 2],
     wrong: [f64; 4],
     near: u32,

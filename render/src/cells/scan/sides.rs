@@ -152,17 +152,17 @@ impl<'a> Sides<'a> {
             let mut ranks = Lanes([0_u64; LANES]);
             let mut known = Lanes([0_u64; LANES]);
             for (face, (corners, across)) in FACES.iter().enumerate() {
-                let passed = &passed[way][face].0;
+                let passed = &passed[way][face];
                 for (corner, edge) in corners.iter().zip(across) {
                     for lane in 0..LANES {
-                        weights[*corner].0[lane] |= passed[lane] & areas[*edge].0[lane].to_bits();
+                        weights[*corner].0[lane] |= passed.0[lane] & areas[*edge].0[lane].to_bits();
                     }
                 }
                 if self.planes.known(face) {
                     for lane in 0..LANES {
                         let rank = self.planes.rank(face, [at[0] + lane as i32, at[1]]);
-                        ranks.0[lane] |= passed[lane] & rank.to_bits();
-                        known.0[lane] |= passed[lane];
+                        ranks.0[lane] |= passed.0[lane] & rank.to_bits();
+                        known.0[lane] |= passed.0[lane];
                     }
                 }
             }

@@ -124,7 +124,8 @@ fn early_termination_stays_within_its_bound_and_saves_work() {
     let whole = draw(&item, &camera, SIZE, &workers(2, Engine::Threads));
     for (threshold, most) in [(0.9, 0.8), (1.0 - 1.0 / 512.0, 0.9)] {
         for share in [false, true] {
-            let ways = [(1, Engine::Threads), (2, Engine::Threads), (8, Engine::Simulated), (2, Engine::Blocks)];
+            let ways =
+                [(1, Engine::Threads), (2, Engine::Threads), (8, Engine::Simulated), (2, Engine::Blocks)];
             for (count, engine) in ways {
                 let early = Some(Early { threshold, ..Early::default() });
                 let options = Options { early, share, ..workers(count, engine) };
