@@ -4,6 +4,9 @@
 use super::project::Frame;
 use super::scan::{Corner, Rect};
 use super::stats::Counts;
+#[cfg(target_arch = "x86_64")]
+use crate::simd::Wide;
+use crate::simd::{Four, Plain};
 use crate::volume::cells::Place;
 
 /// Steps of depth in which cells are told apart for going through them from front to back.
@@ -39,7 +42,7 @@ impl InView {
         counts: &mut Counts,
     ) {
         if !frame.wide {
-            self.fill_by(frame, cluster, scratch, counts);
+            self.fill_by::<Plain>(frame, cluster, scratch, counts);
             return;
         }
         #[cfg(target_arch = "x86_64")]
@@ -52,7 +55,7 @@ impl InView {
                 scratch: &mut Vec<Shown>,
                 counts: &mut Counts,
             ) {
-                view.fill_by(frame, cluster, scratch, counts);
+                view.fill_by::<Wide>(frame, cluster, scratch, counts);
             }
             #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
             // SAFETY: `wide` is set only where these instructions were detected.
@@ -63,7 +66,13 @@ impl InView {
     }
 
     #[inline(always)]
-    fn fill_by(&mut self, frame: &Frame<'_>, cluster: usize, scratch: &mut Vec<Shown>, counts: &mut Counts) {
+    fn fill_by<F: Four>(
+        &mut self,
+        frame: &Frame<'_>,
+        cluster: usize,
+        scratch: &mut Vec<Shown>,
+        counts: &mut Counts,
+    ) {
         let of_points = frame.scalars.place() == Place::Points;
         let raw = frame.scalars.of(cluster);
         let points = frame.clusters.points(cluster).iter();
@@ -76,41 +85,49 @@ impl InView {
             self.corners.extend(points.map(|p| frame.lens.corner(p, 0.0)));
             self.constants.extend(raw.iter().map(|&v| frame.table.position(v) as f32));
         }
-        self.choose(frame, cluster, scratch, counts);
+        self.choose::<F>(frame, cluster, scratch, counts);
         self.put_in_order(scratch);
     }
 
     /// Decides which tetrahedra may show.
     #[inline(always)]
-    fn choose(&self, frame: &Frame<'_>, cluster: usize, chosen: &mut Vec<Shown>, counts: &mut Counts) {
+    fn choose<F: Four>(
+        &self,
+        frame: &Frame<'_>,
+        cluster: usize,
+        chosen: &mut Vec<Shown>,
+        counts: &mut Counts,
+    ) {
         chosen.clear();
         let picture = frame.rect();
         let of_points = frame.scalars.place() == Place::Points;
         let raw = frame.scalars.of(cluster);
         for (index, tetrahedron) in frame.clusters.tetrahedra(cluster).iter().enumerate() {
-            let corners = tetrahedron.map(|v| &self.corners[v as usize]);
-            let values = if of_points { tetrahedron.map(|v| raw[v as usize]) } else { [raw[index]; 4] };
-            let sum: f64 = corners.iter().map(|c| c.x + c.y + c.z).sum::<f64>() + values.iter().sum::<f64>();
+            let [p, q, r, s] = tetrahedron.map(|v| v as usize);
+            let values = if of_points { [raw[p], raw[q], raw[r], raw[s]] } else { [raw[index]; 4] };
+            let (p, q) = (place::<F>(&self.corners[p]), place::<F>(&self.corners[q]));
+            let (r, s) = (place::<F>(&self.corners[r]), place::<F>(&self.corners[s]));
+            let [x, y, w, depth] = ((p + q) + (r + s)).to_array();
+            let sum = ((x + y) + (w + depth)) + ((values[0] + values[1]) + (values[2] + values[3]));
             if !sum.is_finite() {
                 counts.not_finite += 1;
                 continue;
             }
-            let [mut low, mut high, mut nearest, mut farthest] =
-                [values[0], values[0], corners[0].z, corners[0].z];
-            for i in 1..4 {
-                (low, high) = (low.min(values[i]), high.max(values[i]));
-                (nearest, farthest) = (nearest.min(corners[i].z), farthest.max(corners[i].z));
-            }
-            if frame.skip_clear && frame.table.is_clear([low, high]) {
+            if frame.skip_clear && frame.table.is_clear(range(values)) {
                 counts.clear += 1;
                 continue;
             }
-            let reach = Rect::around(corners, &picture);
+            let [left, top, least_w, nearest] = p.least(q).least(r.least(s)).to_array();
+            let [right, bottom, most_w, farthest] = p.most(q).most(r.most(s)).to_array();
+            let reach = if least_w == 1.0 && most_w == 1.0 {
+                Rect::between([left, top], [right, bottom]).meet(&picture)
+            } else {
+                picture
+            };
             if reach.is_empty() || farthest <= 0.0 {
                 counts.outside += 1;
                 continue;
             }
-            let depth = (corners[0].z + corners[1].z) + (corners[2].z + corners[3].z);
             chosen.push(Shown { tetrahedron: index as u32, reach, nearest, depth });
         }
     }
@@ -141,4 +158,16 @@ impl InView {
             *place += 1;
         }
     }
+}
+
+/// Place of a corner, w and depth.
+#[inline(always)]
+fn place<F: Four>(corner: &Corner) -> F {
+    F::from_array([corner.x, corner.y, corner.w, corner.z])
+}
+
+/// The least and the greatest.
+#[inline(always)]
+fn range([a, b, c, d]: [f64; 4]) -> [f64; 2] {
+    [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]
 }

@@ -18,6 +18,7 @@ const LANES: usize = 4;
 
 /// A corner before the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)]
 pub(super) struct Corner {
     /// Place in the picture, pixels, times w.
     pub(super) x: f64,
@@ -86,12 +87,14 @@ impl Rect {
             low = [low[0].min(c.x), low[1].min(c.y)];
             high = [high[0].max(c.x), high[1].max(c.y)];
         }
+        Self::between(low, high).meet(within)
+    }
+
+    /// The pixels whose middles lie between two places.
+    #[inline(always)]
+    pub(super) fn between(low: [f64; 2], high: [f64; 2]) -> Self {
         // `as` saturates; one more keeps the range half open.
-        let found = Self {
-            low: low.map(|v| v.ceil() as i32),
-            high: high.map(|v| (v.floor() as i32).saturating_add(1)),
-        };
-        found.meet(within)
+        Self { low: low.map(|v| v.ceil() as i32), high: high.map(|v| (v.floor() as i32).saturating_add(1)) }
     }
 }
 
