@@ -7,7 +7,8 @@ use super::in_view::{InView, Shown};
 use super::lens::Lens;
 use super::scan::{Found, Raw, Raws, Rect, scan};
 use super::stats::Counts;
-use super::table::{BATCH, Batch, Table};
+use super::table::eight::{self, Eight};
+use super::table::{BATCH, Batch, Stretches, Table};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::Wide;
 use crate::simd::{Four, Plain};
@@ -49,15 +50,44 @@ impl Frame<'_> {
     }
 }
 
-/// What a pixel has of a cluster while its tetrahedra are gone through.
-#[derive(Debug, Clone, Copy)]
+/// What pixels have of a cluster while its tetrahedra are gone through.
+#[derive(Debug, Default)]
 struct Open {
-    /// The run that was last gone on with; its back is less than nothing where there is none.
-    run: Segment,
-    /// Millimetres for one of depth.
-    stretch: f64,
+    /// The run that was last gone on with.
+    runs: Vec<Run>,
     /// The last of those put aside, or [`NONE`], or [`MIXED`].
-    aside: u32,
+    last: Vec<u32>,
+    /// Runs put aside, each with the one before it.
+    aside: Vec<(Segment, u32)>,
+    /// Millimetres for one of depth, where that is not one everywhere.
+    stretches: Vec<f64>,
+}
+
+/// A run of a pixel, within a line of a cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
+struct Run(Segment);
+
+impl Run {
+    /// Where there is none: nothing, that ends before all and begins after.
+    const NONE: Self = Self(Segment { front: f64::INFINITY, back: -1.0, rgba: [0.0; 4] });
+}
+
+impl Open {
+    /// For the pixels of a tile, with nothing in them.
+    fn begin(&mut self, lens: &Lens, tile: &Rect) {
+        self.runs.clear();
+        self.runs.resize(tile.area(), Run::NONE);
+        self.last.clear();
+        self.last.resize(tile.area(), NONE);
+        self.aside.clear();
+        self.stretches.clear();
+        if lens.perspective() {
+            for y in tile.low[1]..tile.high[1] {
+                self.stretches.extend((tile.low[0]..tile.high[0]).map(|x| lens.stretch([x, y])));
+            }
+        }
+    }
 }
 
 const NONE: u32 = u32::MAX;
@@ -93,9 +123,7 @@ pub(super) struct Cluster<'a> {
 pub(super) struct Projector {
     shown: Vec<Shown>,
     gathered: Box<Raws>,
-    open: Vec<Open>,
-    /// Runs put aside, each with the one before it.
-    aside: Vec<(Segment, u32)>,
+    open: Open,
     raws: Vec<Raw>,
     counts: Vec<u32>,
     ordered: Vec<Raw>,
@@ -250,20 +278,13 @@ impl Projector {
         counts: &mut Counts,
         done: &mut impl FnMut(usize, Segment),
     ) {
-        let none = Segment { front: -1.0, back: -1.0, rgba: [0.0; 4] };
-        self.open.clear();
-        for y in tile.low[1]..tile.high[1] {
-            let columns = tile.low[0]..tile.high[0];
-            let stretch = |x| frame.lens.stretch([x, y]);
-            self.open.extend(columns.map(|x| Open { run: none, stretch: stretch(x), aside: NONE }));
-        }
-        self.aside.clear();
-        let (open, aside) = (&mut self.open, &mut self.aside);
+        self.open.begin(&frame.lens, tile);
+        let open = &mut self.open;
         let mut batch = Batch::new();
         let tetrahedra = frame.clusters.tetrahedra(of.cluster);
         let mut go_on = |raws: Found<'_>, constant: Option<f32>| {
             counts.segments += raws.len() as u64;
-            go_on(frame, raws, constant, &mut batch, open, aside);
+            go_on(frame, raws, constant, &mut batch, open);
         };
         for shown in &self.shown {
             let reach = shown.reach.meet(tile);
@@ -280,10 +301,12 @@ impl Projector {
         go_on(self.gathered.take(), None);
         let [across, _] = tile.size();
         let mut mixed = false;
-        for (y, row) in (tile.low[1]..).zip(self.open.chunks_exact_mut(across)) {
+        let open = &mut self.open;
+        let rows = open.runs.chunks_exact(across).zip(open.last.chunks_exact_mut(across));
+        for (y, (runs, lasts)) in (tile.low[1]..).zip(rows) {
             let first = rect.number([tile.low[0], y]);
-            for (x, open) in row.iter_mut().enumerate() {
-                if open.run.back < 0.0 {
+            for (x, (Run(run), last)) in runs.iter().zip(lasts).enumerate() {
+                if run.back < 0.0 {
                     continue;
                 }
                 let mut done = |run: Segment| {
@@ -292,19 +315,19 @@ impl Projector {
                         done(first + x, run);
                     }
                 };
-                if open.aside == NONE {
-                    done(open.run);
+                if *last == NONE {
+                    done(*run);
                     continue;
                 }
                 self.spans.clear();
-                self.spans.push(open.run);
-                while let Some(&(run, before)) = self.aside.get(open.aside as usize) {
+                self.spans.push(*run);
+                while let Some(&(run, before)) = open.aside.get(*last as usize) {
                     self.spans.push(run);
-                    open.aside = before;
+                    *last = before;
                 }
                 self.spans.sort_unstable_by(Segment::order);
                 if overlap(&self.spans) {
-                    (open.aside, mixed) = (MIXED, true);
+                    (*last, mixed) = (MIXED, true);
                 } else {
                     merge(&self.spans, done);
                 }
@@ -312,14 +335,14 @@ impl Projector {
         }
         if mixed {
             let open = std::mem::take(&mut self.open);
-            self.one_by_one::<F>(frame, of, [rect, tile], &open, counts, done);
+            self.one_by_one::<F>(frame, of, [rect, tile], &open.last, counts, done);
             self.open = open;
         }
     }
 
     /// Appends the stretches of what is chosen; of the mixed pixels of `only`, if given.
     #[inline(always)]
-    fn collect<F: Four>(&mut self, frame: &Frame<'_>, of: Cluster<'_>, tile: &Rect, only: Option<&[Open]>) {
+    fn collect<F: Four>(&mut self, frame: &Frame<'_>, of: Cluster<'_>, tile: &Rect, only: Option<&[u32]>) {
         let tetrahedra = frame.clusters.tetrahedra(of.cluster);
         for shown in &self.shown {
             let reach = shown.reach.meet(tile);
@@ -329,7 +352,7 @@ impl Projector {
             let (totals, raws) = (&mut self.counts, &mut self.raws);
             let mut keep = |found: Found<'_>| {
                 for mut raw in (0..found.len()).map(|n| found.get(n)) {
-                    if only.is_none_or(|open| open[raw.pixel as usize].aside == MIXED) {
+                    if only.is_none_or(|last| last[raw.pixel as usize] == MIXED) {
                         totals[raw.pixel as usize] += 1;
                         if let Some(&value) = constant {
                             raw.values = [value; 2];
@@ -350,14 +373,14 @@ impl Projector {
         frame: &Frame<'_>,
         of: Cluster<'_>,
         [rect, tile]: [&Rect; 2],
-        open: &[Open],
+        last: &[u32],
         counts: &mut Counts,
         done: &mut impl FnMut(usize, Segment),
     ) {
         self.counts.clear();
         self.counts.resize(tile.area(), 0);
         self.raws.clear();
-        self.collect::<F>(frame, of, tile, Some(open));
+        self.collect::<F>(frame, of, tile, Some(last));
         if self.raws.is_empty() {
             return;
         }
@@ -393,71 +416,74 @@ impl Projector {
 }
 
 /// Integrates stretches and goes on with the runs of their pixels.
-fn go_on(
-    frame: &Frame<'_>,
-    raws: Found<'_>,
-    constant: Option<f32>,
-    batch: &mut Batch,
-    open: &mut [Open],
-    aside: &mut Vec<(Segment, u32)>,
-) {
+fn go_on(frame: &Frame<'_>, raws: Found<'_>, constant: Option<f32>, batch: &mut Batch, open: &mut Open) {
     if !frame.wide {
-        go_on_by(frame.table, raws, constant, batch, open, aside);
+        go_on_by::<eight::Plain>(frame, raws, constant, batch, open);
         return;
     }
     #[cfg(target_arch = "x86_64")]
     {
         #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
         fn wide(
-            table: &Table,
+            frame: &Frame<'_>,
             raws: Found<'_>,
             constant: Option<f32>,
             batch: &mut Batch,
-            open: &mut [Open],
-            aside: &mut Vec<(Segment, u32)>,
+            open: &mut Open,
         ) {
-            go_on_by(table, raws, constant, batch, open, aside);
+            go_on_by::<eight::Wide>(frame, raws, constant, batch, open);
         }
         #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
         // SAFETY: `wide` is set only where these instructions were detected.
         unsafe {
-            wide(frame.table, raws, constant, batch, open, aside);
+            wide(frame, raws, constant, batch, open);
         }
     }
 }
 
 #[inline(always)]
-fn go_on_by(
-    table: &Table,
+fn go_on_by<E: Eight>(
+    frame: &Frame<'_>,
     raws: Found<'_>,
     constant: Option<f32>,
     batch: &mut Batch,
-    open: &mut [Open],
-    aside: &mut Vec<(Segment, u32)>,
+    open: &mut Open,
 ) {
+    let mut mm = [0.0; BATCH];
+    let same = constant.map(|value| [value; BATCH]);
     for first in (0..raws.len()).step_by(BATCH) {
         let raws = raws.part(first, BATCH);
-        for n in 0..raws.len() {
-            let raw = raws.get(n);
-            let values = constant.map_or(raw.values, |value| [value; 2]);
-            batch.set(n, values, length(raw.back - raw.front, open[raw.pixel as usize].stretch));
+        let mm = &mut mm[..raws.len()];
+        let spans = raws.fronts.iter().zip(raws.backs).map(|(front, back)| back - front);
+        if frame.lens.perspective() {
+            for ((mm, span), &pixel) in mm.iter_mut().zip(spans).zip(raws.pixels) {
+                *mm = length(span, open.stretches[pixel as usize]);
+            }
+        } else {
+            for (mm, span) in mm.iter_mut().zip(spans) {
+                *mm = length(span, 1.0);
+            }
         }
-        table.segments(batch, raws.len());
-        for n in 0..raws.len() {
-            let (raw, rgba) = (raws.get(n), batch.seen(n));
-            let Open { run, aside: last, .. } = &mut open[raw.pixel as usize];
-            if raw.front == run.back {
+        let [from, to] = same.as_ref().map_or([raws.from, raws.to], |same| [&same[..raws.len()]; 2]);
+        frame.table.segments::<E>(batch, Stretches { from, to, mm });
+        for (n, (&pixel, &rgba)) in raws.pixels.iter().zip(batch.seen()).enumerate() {
+            let Run(run) = &mut open.runs[pixel as usize];
+            let [front, back] = [raws.fronts[n], raws.backs[n]];
+            // A run begins with nothing, as it goes on.
+            if (front == run.back) | (run.back < 0.0) {
+                run.front = run.front.min(front);
+                run.back = back;
                 under(&mut run.rgba, rgba);
-                run.back = raw.back;
                 continue;
             }
-            let mut new = Segment { front: raw.front, back: raw.back, rgba };
-            if raw.back == run.front {
+            let mut new = Segment { front, back, rgba };
+            if back == run.front {
                 under(&mut new.rgba, run.rgba);
                 new.back = run.back;
-            } else if run.back >= 0.0 {
-                aside.push((*run, *last));
-                *last = (aside.len() - 1) as u32;
+            } else {
+                let last = &mut open.last[pixel as usize];
+                open.aside.push((*run, *last));
+                *last = (open.aside.len() - 1) as u32;
             }
             *run = new;
         }

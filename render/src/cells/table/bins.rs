@@ -1,10 +1,10 @@
 //! The function in bins of one width, for looking up without a search.
 //!
-//! A bin is a line of a cache. Extinction is taken as linear in it, such that what the bin holds is met; so only the parts
+//! A bin is two lines of a cache. Extinction is taken as linear in it, such that what the bin holds is met; so only the parts
 //! of bins at the ends of a segment are not exact, and bins in which these would be off by more than [`SAME`] are marked.
 //! The width is such that control points fall between bins if any width near by has it so.
 
-use super::quad::Quad;
+use super::eight::Eight;
 use super::{Node, Piece};
 
 /// Bins below the first control point: a constant one, and one that ends there.
@@ -21,36 +21,37 @@ pub(super) const MARKED: u32 = 1 << 31;
 
 /// The function from one place on.
 #[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
+#[repr(C, align(128))]
 pub(super) struct Bin {
     /// Antiderivative at its begin, for one of bins: (τ·red, τ·green, τ·blue, τ), and what rounding has left of it.
-    sum: Quad,
-    rest: Quad,
-    /// (red, green, blue, 1) there.
-    light: Quad,
-    tau: f32,
-    /// How much colour has varied up to there, and goes on to in the bin.
-    varied: f32,
-    varies: f32,
+    sum: [f32; 4],
+    rest: [f32; 4],
+    /// Extinction there, and half of its rise up to the next bin.
+    rate: [f32; 4],
+    half_rise: [f32; 4],
+    /// (red, green, blue, how much colour has varied) there, and their rise up to the next bin.
+    light: [f32; 4],
+    turn: [f32; 4],
     /// The ramp, with [`MARKED`].
     pub(super) ramp: u32,
+    /// The piece at its begin.
+    pub(super) piece: u32,
 }
 
-/// The function at a place in a bin.
+/// The function at places in two bins.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Within {
+pub(super) struct Within<E> {
     /// Antiderivative at the begin of the bin, and from there on.
-    sum: Quad,
-    ahead: Quad,
-    pub(super) rate: Quad,
-    pub(super) light: Quad,
-    pub(super) varied: f32,
+    sum: E,
+    ahead: E,
+    pub(super) rate: E,
+    pub(super) light: E,
 }
 
-impl Within {
+impl<E: Eight> Within<E> {
     /// The antiderivative less that at another place.
     #[inline(always)]
-    pub(super) fn since(&self, from: &Self) -> Quad {
+    pub(super) fn since(&self, from: &Self) -> E {
         (self.sum - from.sum) + (self.ahead - from.ahead)
     }
 }
@@ -87,47 +88,50 @@ impl Bins {
             }
             let here = exact.at(piece, begin / scale);
             if let (Some(before), Some(bin)) = (before, list.last_mut()) {
-                bin.varies = (here.varied - before.varied) as f32;
-                if !exact.is_even(&before, &here, [first, piece], [begin - 1.0, begin].map(|at| at / scale)) {
-                    bin.ramp |= MARKED;
+                // What is the same for ever has no rise at all, which would count far out.
+                if !exact.is_constant([first, piece]) {
+                    bin.half_rise = std::array::from_fn(|c| {
+                        ((here.sum[c] - before.sum[c]) * scale - f64::from(bin.rate[c])) as f32
+                    });
+                    bin.turn = std::array::from_fn(|c| (here.light[c] - before.light[c]) as f32);
+                    if !exact.is_even(&before, &here, [first, piece], [begin - 1.0, begin].map(|at| at / scale)) {
+                        bin.ramp |= MARKED;
+                    }
                 }
             }
             let sum = here.sum.map(|sum| (sum * scale) as f32);
             list.push(Bin {
-                sum: Quad::new(sum),
-                rest: Quad::new(std::array::from_fn(|c| (here.sum[c] * scale - f64::from(sum[c])) as f32)),
-                light: Quad::new(here.light.map(|v| v as f32)),
-                tau: here.rate[3] as f32,
-                varied: here.varied as f32,
-                varies: 0.0,
+                sum,
+                rest: std::array::from_fn(|c| (here.sum[c] * scale - f64::from(sum[c])) as f32),
+                rate: here.rate.map(|v| v as f32),
+                half_rise: [0.0; 4],
+                light: here.light.map(|v| v as f32),
+                turn: [0.0; 4],
                 ramp: exact.pieces[piece].ramp,
+                piece: piece as u32,
             });
             before = Some(here);
         }
         Self { list, scale, range: [f64::from(-BELOW), count as f64] }
     }
 
-    /// A bin and the next.
     #[inline(always)]
-    pub(super) fn pair(&self, bin: u32) -> &[Bin] {
-        &self.list[bin as usize..bin as usize + 2]
+    pub(super) fn bin(&self, number: u32) -> &Bin {
+        &self.list[number as usize]
     }
 }
 
 impl Bin {
-    /// So many bins behind its begin.
+    /// So many bins behind its begin, and behind that of another.
     #[inline(always)]
-    pub(super) fn within(&self, next: &Self, part: f32) -> Within {
-        let behind = Quad::all(part);
-        let begin = self.light * Quad::all(self.tau);
-        let mean = (next.sum - self.sum) + (next.rest - self.rest);
-        let rise = behind * (mean - begin);
+    pub(super) fn within<E: Eight>(&self, other: &Self, part: E) -> Within<E> {
+        let rate = E::of(&self.rate, &other.rate);
+        let rise = part * E::of(&self.half_rise, &other.half_rise);
         Within {
-            sum: self.sum,
-            ahead: self.rest + behind * (begin + rise),
-            rate: begin + (rise + rise),
-            light: self.light + behind * (next.light - self.light),
-            varied: self.varied + part * self.varies,
+            sum: E::of(&self.sum, &other.sum),
+            ahead: E::of(&self.rest, &other.rest) + part * (rate + rise),
+            rate: rate + (rise + rise),
+            light: E::of(&self.light, &other.light) + part * E::of(&self.turn, &other.turn),
         }
     }
 }
@@ -175,9 +179,8 @@ struct At {
     sum: [f64; 4],
     /// (τ·red, τ·green, τ·blue, τ).
     rate: [f64; 4],
-    /// (red, green, blue, 1).
+    /// (red, green, blue, how much colour has varied up to there).
     light: [f64; 4],
-    varied: f64,
 }
 
 impl Exact<'_> {
@@ -199,21 +202,21 @@ impl Exact<'_> {
             sum: std::array::from_fn(|c| node.sum[c] + part * (from[c] + part * half_rise[c]) * width),
             rate,
             light: std::array::from_fn(|c| match c {
-                3 => 1.0,
+                3 => f64::from(piece.varied) + f64::from(piece.varies) * ahead,
                 _ => f64::from(piece.color[c]) + f64::from(piece.slope[c]) * ahead,
             }),
-            varied: f64::from(piece.varied) + f64::from(piece.varies) * ahead,
         }
+    }
+
+    /// Whether nothing changes between the begins of two bins that lie in these pieces.
+    fn is_constant(&self, [first, after]: [usize; 2]) -> bool {
+        let [first, after] = [first, after].map(|piece| &self.pieces[piece]);
+        first.ramp == after.ramp && first.first == first.last
     }
 
     /// Whether a bin between two positions, which begins in one piece and after which another one begins, is all but what
     /// lines between its ends make it.
     fn is_even(&self, from: &At, to: &At, [first, after]: [usize; 2], [begin, end]: [f64; 2]) -> bool {
-        if self.pieces[first].ramp == self.pieces[after].ramp
-            && self.pieces[first].first == self.pieces[first].last
-        {
-            return true;
-        }
         let width = end - begin;
         let mean: [f64; 4] = std::array::from_fn(|c| (to.sum[c] - from.sum[c]) / width);
         let holds = |at: &At, part: f64, peak: f64| {
@@ -221,7 +224,7 @@ impl Exact<'_> {
                 let rate = from.rate[c] + 2.0 * part * (mean[c] - from.rate[c]);
                 let light = from.light[c] + part * (to.light[c] - from.light[c]);
                 let same = (at.rate[c] - rate).abs() <= SAME * peak;
-                same && (peak == 0.0 || (at.light[c] - light).abs() <= SAME)
+                same && (c == 3 || peak == 0.0 || (at.light[c] - light).abs() <= SAME)
             })
         };
         let mut even = true;

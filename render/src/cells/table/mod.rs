@@ -14,14 +14,14 @@
 
 mod batch;
 mod bins;
+pub(super) mod eight;
 mod make;
 mod opacity;
 mod parts;
-mod quad;
 #[cfg(test)]
 mod tests;
 
-pub(super) use batch::{BATCH, Batch};
+pub(super) use batch::{BATCH, Batch, Stretches};
 pub(super) use opacity::opacity;
 
 use bins::Bins;

@@ -1,4 +1,5 @@
-use super::{BATCH, Batch, Table};
+use super::eight::{Eight, Plain};
+use super::{BATCH, Batch, Stretches, Table};
 use crate::volume::{ControlPoint, Transfer};
 
 fn transfer(points: &[[f64; 5]], unit_mm: f64) -> Transfer {
@@ -131,12 +132,15 @@ fn some(transfer: &Transfer, state: &mut u64) -> ([f32; 2], f32) {
 }
 
 fn at_once(table: &Table, segments: &[([f32; 2], f32)]) -> Vec<[f32; 4]> {
+    at_once_by::<Plain>(table, segments)
+}
+
+fn at_once_by<E: Eight>(table: &Table, segments: &[([f32; 2], f32)]) -> Vec<[f32; 4]> {
+    let of = |part: fn(&([f32; 2], f32)) -> f32| -> Vec<f32> { segments.iter().map(part).collect() };
+    let [from, to, mm] = [of(|s| s.0[0]), of(|s| s.0[1]), of(|s| s.1)];
     let mut batch = Batch::new();
-    for (n, &(ends, mm)) in segments.iter().enumerate() {
-        batch.set(n, ends, mm);
-    }
-    table.segments(&mut batch, segments.len());
-    (0..segments.len()).map(|n| batch.seen(n)).collect()
+    table.segments::<E>(&mut batch, Stretches { from: &from, to: &to, mm: &mm });
+    batch.seen()[..segments.len()].to_vec()
 }
 
 #[test]
@@ -165,6 +169,21 @@ fn a_segment_is_the_same_in_any_company() {
         for (seen, &segment) in all.iter().zip(&segments) {
             assert_eq!(at_once(&table, &[segment]), [*seen], "{name}, {segment:?}");
         }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn wide_instructions_give_the_same() {
+    if !crate::simd::has_wide() {
+        return;
+    }
+    let mut state = 13;
+    for (name, transfer) in functions() {
+        let table = Table::new(&transfer);
+        let segments: Vec<_> = (0..BATCH - 3).map(|_| some(&transfer, &mut state)).collect();
+        let wide = at_once_by::<super::eight::Wide>(&table, &segments);
+        assert_eq!(at_once(&table, &segments), wide, "{name}");
     }
 }
 
