@@ -14,8 +14,11 @@ use super::split;
 use crate::volume::cells::{CellGrid, CellKind, Place};
 use crate::volume::{Point, Vector};
 
-/// Tetrahedra in a cluster at most; more only where many have the same corners.
-const CLUSTER: usize = 512;
+/// Tetrahedra in a cluster at most, in small grids and in large ones; more only where many have the same corners. Larger
+/// clusters make longer runs; smaller ones are shared out and hidden more evenly.
+const CLUSTER: [usize; 2] = [512, 1024];
+/// From so many clusters on a grid is large.
+const LARGE: usize = 128;
 
 /// What was wrong with cells, by its count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -100,6 +103,7 @@ impl Clusters {
                 begin = i;
             }
         }
+        let most = (groups.len() / LARGE).clamp(CLUSTER[0], CLUSTER[1]);
         // Halves of halves, across the longest side, the lower one first.
         let mut open = vec![&mut groups[..]];
         while let Some(range) = open.pop() {
@@ -108,7 +112,7 @@ impl Clusters {
             for middle in middles {
                 (low, high) = (low.inf(middle), high.sup(middle));
             }
-            if range.len() <= CLUSTER {
+            if range.len() <= most {
                 clusters.add(grid, &parts, range);
                 continue;
             }

@@ -2,7 +2,7 @@
 //!
 //! After Takayama et al., "Cell-projection parallel volume rendering with early ray termination":
 //!
-//! 1. `split`, `clusters`: cells become tetrahedra, the same across a shared face, in clusters of a few hundred near ones.
+//! 1. `split`, `clusters`: cells become tetrahedra, the same across a shared face, in clusters of up to a thousand near ones.
 //!    That is done once a grid.
 //! 2. `lens`, `in_view`: corners are projected, and cells that may show put roughly in order of depth. That is done once a
 //!    picture.
