@@ -115,13 +115,11 @@ impl<E: Eight> Two<E> {
 #[inline(always)]
 fn eight<'a>(of: &'a [f32], k: usize, padded: &'a mut [f32; WIDE]) -> &'a [f32; WIDE] {
     let of = &of[k * WIDE..];
-    match of.first_chunk() {
-        Some(all) => all,
-        None => {
-            pad(of, padded);
-            padded
-        }
+    if let Some(all) = of.first_chunk() {
+        return all;
     }
+    pad(of, padded);
+    padded
 }
 
 #[cold]

@@ -122,7 +122,11 @@ impl Eight for Plain {
 pub(in super::super) use wide::Wide;
 
 #[cfg(target_arch = "x86_64")]
-#[expect(unsafe_code, reason = "instructions that the machine has to be asked for")]
+#[expect(
+    unsafe_code,
+    clippy::undocumented_unsafe_blocks,
+    reason = "instructions that the machine has to be asked for; why they may be used is said once"
+)]
 mod wide {
     use std::arch::x86_64::{
         __m256, _CMP_LT_OQ, _mm_loadu_ps, _mm_storeu_ps, _mm256_add_ps, _mm256_andnot_ps, _mm256_blend_ps,
