@@ -470,8 +470,8 @@ fn go_on_by<E: Eight>(
             let Run(run) = &mut open.runs[pixel as usize];
             let [front, back] = [raws.fronts[n], raws.backs[n]];
             // A run begins with nothing, as it goes on.
-            if (front == run.back) | (run.back < 0.0) {
-                run.front = run.front.min(front);
+            if front == run.back || run.back < 0.0 {
+                run.front = if front < run.front { front } else { run.front };
                 run.back = back;
                 under(&mut run.rgba, rgba);
                 continue;

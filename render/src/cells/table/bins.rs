@@ -94,7 +94,12 @@ impl Bins {
                         ((here.sum[c] - before.sum[c]) * scale - f64::from(bin.rate[c])) as f32
                     });
                     bin.turn = std::array::from_fn(|c| (here.light[c] - before.light[c]) as f32);
-                    if !exact.is_even(&before, &here, [first, piece], [begin - 1.0, begin].map(|at| at / scale)) {
+                    if !exact.is_even(
+                        &before,
+                        &here,
+                        [first, piece],
+                        [begin - 1.0, begin].map(|at| at / scale),
+                    ) {
                         bin.ramp |= MARKED;
                     }
                 }

@@ -12,6 +12,10 @@ pub(in super::super) trait Eight:
     fn of(low: &[f32; 4], high: &[f32; 4]) -> Self;
     /// Writes the halves.
     fn put(self, low: &mut [f32; 4], high: &mut [f32; 4]);
+    fn over(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    /// One number or another, by whether these are less than those of a limit.
+    fn below(self, limit: Self, yes: Self, no: Self) -> Self;
     /// In each half: each two bits of `ORDER` say which comes there, the lowest first.
     fn picked<const ORDER: i32>(self) -> Self;
     /// The last of each half of all: those of the lower halves, then those of the upper.
@@ -84,6 +88,21 @@ impl Eight for Plain {
     }
 
     #[inline(always)]
+    fn over(self, other: Self) -> Self {
+        self.with(other, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.with(self, |v, _| v.abs())
+    }
+
+    #[inline(always)]
+    fn below(self, limit: Self, yes: Self, no: Self) -> Self {
+        Self(std::array::from_fn(|n| if self.0[n] < limit.0[n] { yes.0[n] } else { no.0[n] }))
+    }
+
+    #[inline(always)]
     fn picked<const ORDER: i32>(self) -> Self {
         Self(std::array::from_fn(|n| self.0[(n & 4) + (ORDER >> (2 * (n & 3)) & 3) as usize]))
     }
@@ -103,13 +122,18 @@ impl Eight for Plain {
 pub(in super::super) use wide::Wide;
 
 #[cfg(target_arch = "x86_64")]
-#[expect(unsafe_code, reason = "instructions that the machine has to be asked for")]
+#[expect(
+    unsafe_code,
+    clippy::undocumented_unsafe_blocks,
+    reason = "instructions that the machine has to be asked for; why they may be used is said once"
+)]
 mod wide {
     use std::arch::x86_64::{
-        __m256, _mm_loadu_ps, _mm_storeu_ps, _mm256_add_ps, _mm256_blend_ps, _mm256_castps_pd, _mm256_castpd_ps,
-        _mm256_castps256_ps128, _mm256_extractf128_ps, _mm256_loadu_ps, _mm256_mul_ps, _mm256_permute_ps,
-        _mm256_set_m128, _mm256_setzero_ps, _mm256_storeu_ps, _mm256_sub_ps, _mm256_unpackhi_pd,
-        _mm256_unpackhi_ps,
+        __m256, _CMP_LT_OQ, _mm_loadu_ps, _mm_storeu_ps, _mm256_add_ps, _mm256_andnot_ps, _mm256_blend_ps,
+        _mm256_blendv_ps, _mm256_castpd_ps, _mm256_castps_pd, _mm256_castps256_ps128, _mm256_cmp_ps,
+        _mm256_div_ps, _mm256_extractf128_ps, _mm256_loadu_ps, _mm256_mul_ps, _mm256_permute_ps,
+        _mm256_set_m128, _mm256_set1_ps, _mm256_setzero_ps, _mm256_storeu_ps, _mm256_sub_ps,
+        _mm256_unpackhi_pd, _mm256_unpackhi_ps,
     };
     use std::ops::{Add, Mul, Sub};
 
@@ -170,6 +194,21 @@ mod wide {
                 _mm_storeu_ps(low.as_mut_ptr(), _mm256_castps256_ps128(self.0));
                 _mm_storeu_ps(high.as_mut_ptr(), _mm256_extractf128_ps::<1>(self.0));
             }
+        }
+
+        #[inline(always)]
+        fn over(self, other: Self) -> Self {
+            Self(unsafe { _mm256_div_ps(self.0, other.0) })
+        }
+
+        #[inline(always)]
+        fn abs(self) -> Self {
+            Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+        }
+
+        #[inline(always)]
+        fn below(self, limit: Self, yes: Self, no: Self) -> Self {
+            Self(unsafe { _mm256_blendv_ps(no.0, yes.0, _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, limit.0)) })
         }
 
         #[inline(always)]

@@ -47,11 +47,14 @@ impl Table {
                 let mut begin = (ends[0], a.rgba);
                 made.ramp += 1;
                 for part in opaque_cuts([a.rgba[3], b.rgba[3]]).chain([1.0]) {
-                    let mix = |c: usize| a.rgba[c] + (b.rgba[c] - a.rgba[c]) * part;
                     let end = if part == 1.0 {
                         (ends[1], b.rgba)
                     } else {
-                        (ends[0] + (ends[1] - ends[0]) * part, std::array::from_fn(mix))
+                        // A place that positions, which are of single precision, can tell.
+                        let at = f64::from((ends[0] + (ends[1] - ends[0]) * part) as f32).min(ends[1]);
+                        let part = (at - ends[0]) / (ends[1] - ends[0]);
+                        let mix = |c: usize| a.rgba[c] + (b.rgba[c] - a.rgba[c]) * part;
+                        (at, std::array::from_fn(mix))
                     };
                     if begin.0 < end.0 {
                         made.push(transfer, [begin.0, end.0], [begin.1, end.1]);

@@ -192,7 +192,7 @@ impl Table {
     #[inline(always)]
     pub(super) fn depth(&self, from: &Place, to: &Place, mm: f32) -> [f32; 4] {
         let rise = to.position - from.position;
-        let [piece, other] = [from, to].map(|place| &self.pieces[place.piece]);
+        let (piece, other) = (&self.pieces[from.piece], &self.pieces[to.piece]);
         if rise.abs() * piece.scale.min(other.scale) > STILL {
             let by = mm / rise;
             return std::array::from_fn(|c| (to.sum[c] - from.sum[c]) as f32 * by);
