@@ -29,7 +29,7 @@ pub(super) struct InView {
     pub(super) corners: Vec<Corner>,
     pub(super) cells: Vec<Shown>,
     /// Each tetrahedron's scalar, where it is constant within it: positions in the transfer function.
-    pub(super) constants: Vec<f32>,
+    pub(super) constants: Vec<f64>,
 }
 
 impl InView {
@@ -83,7 +83,7 @@ impl InView {
             self.corners.extend(points.map(|(p, &v)| frame.lens.corner(p, frame.table.position(v))));
         } else {
             self.corners.extend(points.map(|p| frame.lens.corner(p, 0.0)));
-            self.constants.extend(raw.iter().map(|&v| frame.table.position(v) as f32));
+            self.constants.extend(raw.iter().map(|&v| frame.table.position(v)));
         }
         self.choose::<F>(frame, cluster, scratch, counts);
         self.put_in_order(scratch);

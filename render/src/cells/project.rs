@@ -282,23 +282,19 @@ impl Projector {
         let open = &mut self.open;
         let mut batch = Batch::new();
         let tetrahedra = frame.clusters.tetrahedra(of.cluster);
-        let mut go_on = |raws: Found<'_>, constant: Option<f32>| {
+        let mut go_on = |raws: Found<'_>| {
             counts.segments += raws.len() as u64;
-            go_on(frame, raws, constant, &mut batch, open);
+            go_on(frame, raws, &mut batch, open);
         };
+        let perspective = frame.lens.perspective();
         for shown in &self.shown {
             let reach = shown.reach.meet(tile);
             let index = shown.tetrahedron as usize;
             let corners = tetrahedra[index].map(|v| &of.view.corners[v as usize]);
-            let constant = of.view.constants.get(index).copied();
-            scan::<F>(corners, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut |raws| {
-                go_on(raws, constant)
-            });
-            if constant.is_some() {
-                go_on(self.gathered.take(), constant);
-            }
+            let cell = (corners, of.view.constants.get(index).copied());
+            scan::<F>(cell, [tile, &reach], perspective, &mut self.gathered, &mut go_on);
         }
-        go_on(self.gathered.take(), None);
+        go_on(self.gathered.take());
         let [across, _] = tile.size();
         let mut mixed = false;
         let open = &mut self.open;
@@ -348,20 +344,17 @@ impl Projector {
             let reach = shown.reach.meet(tile);
             let index = shown.tetrahedron as usize;
             let corners = tetrahedra[index].map(|v| &of.view.corners[v as usize]);
-            let constant = of.view.constants.get(index);
+            let cell = (corners, of.view.constants.get(index).copied());
             let (totals, raws) = (&mut self.counts, &mut self.raws);
             let mut keep = |found: Found<'_>| {
-                for mut raw in (0..found.len()).map(|n| found.get(n)) {
+                for raw in (0..found.len()).map(|n| found.get(n)) {
                     if only.is_none_or(|last| last[raw.pixel as usize] == MIXED) {
                         totals[raw.pixel as usize] += 1;
-                        if let Some(&value) = constant {
-                            raw.values = [value; 2];
-                        }
                         raws.push(raw);
                     }
                 }
             };
-            scan::<F>(corners, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut keep);
+            scan::<F>(cell, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut keep);
             keep(self.gathered.take());
         }
     }
@@ -416,41 +409,28 @@ impl Projector {
 }
 
 /// Integrates stretches and goes on with the runs of their pixels.
-fn go_on(frame: &Frame<'_>, raws: Found<'_>, constant: Option<f32>, batch: &mut Batch, open: &mut Open) {
+fn go_on(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
     if !frame.wide {
-        go_on_by::<eight::Plain>(frame, raws, constant, batch, open);
+        go_on_by::<eight::Plain>(frame, raws, batch, open);
         return;
     }
     #[cfg(target_arch = "x86_64")]
     {
         #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-        fn wide(
-            frame: &Frame<'_>,
-            raws: Found<'_>,
-            constant: Option<f32>,
-            batch: &mut Batch,
-            open: &mut Open,
-        ) {
-            go_on_by::<eight::Wide>(frame, raws, constant, batch, open);
+        fn wide(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
+            go_on_by::<eight::Wide>(frame, raws, batch, open);
         }
         #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
         // SAFETY: `wide` is set only where these instructions were detected.
         unsafe {
-            wide(frame, raws, constant, batch, open);
+            wide(frame, raws, batch, open);
         }
     }
 }
 
 #[inline(always)]
-fn go_on_by<E: Eight>(
-    frame: &Frame<'_>,
-    raws: Found<'_>,
-    constant: Option<f32>,
-    batch: &mut Batch,
-    open: &mut Open,
-) {
+fn go_on_by<E: Eight>(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
     let mut mm = [0.0; BATCH];
-    let same = constant.map(|value| [value; BATCH]);
     for first in (0..raws.len()).step_by(BATCH) {
         let raws = raws.part(first, BATCH);
         let mm = &mut mm[..raws.len()];
@@ -464,8 +444,7 @@ fn go_on_by<E: Eight>(
                 *mm = length(span, 1.0);
             }
         }
-        let [from, to] = same.as_ref().map_or([raws.from, raws.to], |same| [&same[..raws.len()]; 2]);
-        frame.table.segments::<E>(batch, Stretches { from, to, mm });
+        frame.table.segments::<E>(batch, Stretches { from: raws.from, to: raws.to, mm });
         for (n, (&pixel, &rgba)) in raws.pixels.iter().zip(batch.seen()).enumerate() {
             let Run(run) = &mut open.runs[pixel as usize];
             let [front, back] = [raws.fronts[n], raws.backs[n]];

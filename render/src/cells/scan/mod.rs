@@ -232,28 +232,37 @@ impl Raws {
     }
 }
 
-/// Finds what the rays of `reach`, which lies within `rect`, have of a tetrahedron. Its corners stand in the order of their
-/// numbers. Pixels are counted in `rect`. Whenever much is gathered it goes to `full`; what is left stays in `raws`.
+/// A tetrahedron: its corners, in the order of their numbers, and its scalar where that is one for all of it.
+pub(super) type Tetrahedron<'a> = ([&'a Corner; 4], Option<f64>);
+
+/// The scalar of each corner.
+#[inline(always)]
+fn scalars((corners, constant): &Tetrahedron<'_>) -> [f64; 4] {
+    let [p, q, r, s] = corners;
+    constant.map_or([p.scalar, q.scalar, r.scalar, s.scalar], |value| [value; 4])
+}
+
+/// Finds what the rays of `reach`, which lies within `rect`, have of a tetrahedron. Pixels are counted in `rect`. Whenever much is gathered it goes to `full`; what is left stays in `raws`.
 #[inline(always)]
 pub(super) fn scan<F: Four>(
-    corners: [&Corner; 4],
+    of: Tetrahedron<'_>,
     rects: [&Rect; 2],
     perspective: bool,
     raws: &mut Raws,
     full: &mut impl FnMut(Found<'_>),
 ) {
-    let corners = &corners;
-    let Some(cell) = Cell::new::<F>(corners, perspective) else {
-        flat(corners, rects, perspective, raws, full);
+    let of = &of;
+    let Some(cell) = Cell::new::<F>(of, perspective) else {
+        flat(of, rects, perspective, raws, full);
         return;
     };
     match (cell.near, perspective) {
-        (1, false) => plain::<F, 1, false>(&cell, corners, rects, raws, full),
-        (2, false) => plain::<F, 2, false>(&cell, corners, rects, raws, full),
-        (_, false) => plain::<F, 3, false>(&cell, corners, rects, raws, full),
-        (1, true) => plain::<F, 1, true>(&cell, corners, rects, raws, full),
-        (2, true) => plain::<F, 2, true>(&cell, corners, rects, raws, full),
-        (_, true) => plain::<F, 3, true>(&cell, corners, rects, raws, full),
+        (1, false) => plain::<F, 1, false>(&cell, of, rects, raws, full),
+        (2, false) => plain::<F, 2, false>(&cell, of, rects, raws, full),
+        (_, false) => plain::<F, 3, false>(&cell, of, rects, raws, full),
+        (1, true) => plain::<F, 1, true>(&cell, of, rects, raws, full),
+        (2, true) => plain::<F, 2, true>(&cell, of, rects, raws, full),
+        (_, true) => plain::<F, 3, true>(&cell, of, rects, raws, full),
     }
 }
 
@@ -261,7 +270,7 @@ pub(super) fn scan<F: Four>(
 #[inline(always)]
 fn plain<F: Four, const NEAR: usize, const PERSPECTIVE: bool>(
     cell: &Cell,
-    corners: &[&Corner; 4],
+    of: &Tetrahedron<'_>,
     [rect, reach]: [&Rect; 2],
     raws: &mut Raws,
     full: &mut impl FnMut(Found<'_>),
@@ -279,7 +288,7 @@ fn plain<F: Four, const NEAR: usize, const PERSPECTIVE: bool>(
             if passed.clear & within == within {
                 raws.add_all(first, &passed, passed.hit & within);
             } else {
-                unsure(corners, [i, j], first, lanes, PERSPECTIVE, raws);
+                unsure(of, [i, j], first, lanes, PERSPECTIVE, raws);
             }
             if raws.count >= GATHERED {
                 full(raws.take());
@@ -292,28 +301,21 @@ fn plain<F: Four, const NEAR: usize, const PERSPECTIVE: bool>(
 /// A group of rays of which some pass close to an edge.
 #[cold]
 #[inline(never)]
-fn unsure(
-    corners: &[&Corner; 4],
-    at: [i32; 2],
-    first: u32,
-    lanes: usize,
-    perspective: bool,
-    raws: &mut Raws,
-) {
-    Sides::new(corners, perspective).pass(at, first, lanes, raws);
+fn unsure(of: &Tetrahedron<'_>, at: [i32; 2], first: u32, lanes: usize, perspective: bool, raws: &mut Raws) {
+    Sides::new(of, perspective).pass(at, first, lanes, raws);
 }
 
 /// What `scan` finds, of a cell without planes.
 #[inline(never)]
 fn flat(
-    corners: &[&Corner; 4],
+    of: &Tetrahedron<'_>,
     [rect, reach]: [&Rect; 2],
     perspective: bool,
     raws: &mut Raws,
     full: &mut impl FnMut(Found<'_>),
 ) {
     let width = rect.high[0] - rect.low[0];
-    let sides = Sides::new(corners, perspective);
+    let sides = Sides::new(of, perspective);
     for j in reach.low[1]..reach.high[1] {
         let before = (j - rect.low[1]) * width - rect.low[0];
         for i in (reach.low[0]..reach.high[0]).step_by(LANES) {

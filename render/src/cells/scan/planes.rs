@@ -9,8 +9,7 @@
 //! Two planes rank alike along the line of the edge that they share. Where they do so within what rounding may have done to
 //! them, the ray is left to exact predicates (`sides`). So is a cell that is too flat to have such planes.
 
-use super::Corner;
-use super::FACES;
+use super::{Corner, FACES, Tetrahedron, scalars};
 use crate::simd::{Four, Plain};
 
 /// Roundings, of which an error is made up at most, in units in the last place.
@@ -178,7 +177,8 @@ pub(super) struct Cell {
 impl Cell {
     /// None for one that is too flat, that is not wholly before the eye, or that has no sides that could be told.
     #[inline(always)]
-    pub(super) fn new<F: Four>(corners: &[&Corner; 4], perspective: bool) -> Option<Self> {
+    pub(super) fn new<F: Four>(of: &Tetrahedron<'_>, perspective: bool) -> Option<Self> {
+        let (corners, scalars) = (&of.0, scalars(of));
         let faces = Faces::<F>::new(corners);
         let [x, y, z] = faces.places.map(F::to_array);
         let [nx, ny, nz] = faces.normal.map(F::to_array);
@@ -213,7 +213,7 @@ impl Cell {
         let order = ORDERS[near as usize & 15].map(|face| usize::from(face & 3));
         let pair = |one: usize, other: usize| unsure[order[one]].max(unsure[order[other]]);
         let weight = |corner: usize| if perspective { -z[corner] } else { 1.0 };
-        let rise = |corner: usize| (corners[corner].scalar - corners[0].scalar) * weight(corner);
+        let rise = |corner: usize| (scalars[corner] - scalars[0]) * weight(corner);
         let [one, two, three] = [rise(1), rise(2), rise(3)];
         let part = 1.0 / volume;
         let slope = |n: &[f64; 4]| ((one * n[1] - two * n[2]) + three * n[3]) * part;
@@ -227,7 +227,7 @@ impl Cell {
             near: near.count_ones(),
             unsure: unsure[order[3]],
             unsure_near: [pair(0, 1), pair(0, 2), pair(1, 2)],
-            from: corners[0].scalar,
+            from: scalars[0],
             change: [at_first, right, down, back],
         })
     }

@@ -13,7 +13,7 @@
 use std::cmp::Ordering;
 
 use super::planes::{Planes, depth};
-use super::{Corner, FACES, LANES, Raws};
+use super::{Corner, FACES, LANES, Raws, Tetrahedron, scalars};
 
 /// One of each pixel of a group, where no access of memory straddles two lines of a cache.
 #[derive(Debug, Clone, Copy)]
@@ -64,12 +64,14 @@ pub(super) struct Sides<'a> {
 
 impl<'a> Sides<'a> {
     #[inline(always)]
-    pub(super) fn new(corners: &'a [&'a Corner; 4], perspective: bool) -> Self {
-        let fields = corners.map(|c| {
+    pub(super) fn new(of: &'a Tetrahedron<'a>, perspective: bool) -> Self {
+        let (corners, scalars) = (&of.0, scalars(of));
+        let fields = [0, 1, 2, 3].map(|corner: usize| {
+            let c = corners[corner];
             // A corner beside the eye has not been divided by its depth.
             let divided = perspective && c.w == 1.0;
             let [weight, depth] = if divided { [-c.rank, 1.0] } else { [1.0, c.z] };
-            [weight, depth, c.scalar * weight]
+            [weight, depth, scalars[corner] * weight]
         });
         Self { corners, fields, planes: Planes::new(corners), perspective }
     }
