@@ -31,6 +31,8 @@ struct Entry {
     way: Way,
     frame_ms: f64,
     picture: FloatImage,
+    /// Tetrahedra scan-converted, in each block that they reach into; unknown of a peer.
+    scanned: Option<u64>,
 }
 
 enum Way {
@@ -79,7 +81,7 @@ pub(super) fn run(
             bench.report(json!({
                 "bench": "cells beside a peer", "renderer": entry.name, "opacity": opacity, "view": view, "size": size,
                 "cells": item.grid.len(), "turns": turns, "frame_ms": entry.frame_ms,
-                "times_ours": entry.frame_ms / exact_ms, "max_error_255": error(&entry.picture, &truth),
+                "times_ours": entry.frame_ms / exact_ms, "scanned": entry.scanned, "max_error_255": error(&entry.picture, &truth),
                 "psnr_from_exact_db": apart.psnr_db, "mean_from_exact_255": apart.mean,
                 "line": format!("{opacity} {}", size[0]),
             }))?;
@@ -90,7 +92,7 @@ pub(super) fn run(
 
 impl Entry {
     fn new(name: String, way: Way, [width, height]: [u32; 2]) -> Self {
-        Self { name, way, frame_ms: f64::INFINITY, picture: FloatImage::clear(width, height) }
+        Self { name, way, frame_ms: f64::INFINITY, picture: FloatImage::clear(width, height), scanned: None }
     }
 }
 
@@ -113,7 +115,8 @@ fn take_turns(
                     let begin = Instant::now();
                     let drawn = renderer.render(item, camera, size, options, &|_, _| true);
                     let took = begin.elapsed().as_secs_f64() * 1e3;
-                    entry.picture = drawn.map_err(|e| Failure::Other(e.to_string()))?.image;
+                    let drawn = drawn.map_err(|e| Failure::Other(e.to_string()))?;
+                    (entry.scanned, entry.picture) = (Some(drawn.stats.total.scanned), drawn.image);
                     took
                 }
                 Way::Theirs(peer) => {
