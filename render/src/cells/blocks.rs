@@ -111,19 +111,19 @@ impl<'a> Desk<'a> {
         for &place in near {
             let of = &self.near[place as usize];
             counts.clusters += 1;
-            let mut stale = Vec::new();
+            let mut ended = Vec::new();
             projector.draw(frame, of.cluster(), rect, table.as_ref(), counts, |pixel, run| {
                 lists.add(pixel, run);
                 if let (Some(threshold), Some((through, reach))) = (early, known.get_mut(pixel)) {
                     *through *= 1.0 - run.rgba[3];
                     *reach = reach.max(run.back);
                     if 1.0 - *through >= threshold {
-                        stale.push((pixel, *reach));
+                        ended.push((pixel, *reach));
                     }
                 }
             });
-            if let Some(table) = table.as_mut().filter(|_| !stale.is_empty()) {
-                for (pixel, depth) in stale {
+            if let Some(table) = table.as_mut().filter(|_| !ended.is_empty()) {
+                for (pixel, depth) in ended {
                     table.terminate(pixel, depth);
                 }
                 table.refresh();

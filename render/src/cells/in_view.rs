@@ -5,8 +5,8 @@ use super::project::Frame;
 use super::scan::{Corner, Rect};
 use super::stats::Counts;
 #[cfg(target_arch = "x86_64")]
-use crate::simd::Wide;
-use crate::simd::{Four, Plain};
+use crate::simd::WideFour;
+use crate::simd::{Four, PlainFour};
 use crate::volume::cells::Place;
 
 /// Steps of depth in which cells are told apart for going through them from front to back.
@@ -42,7 +42,7 @@ impl InView {
         counts: &mut Counts,
     ) {
         if !frame.wide {
-            self.fill_by::<Plain>(frame, cluster, scratch, counts);
+            self.fill_by::<PlainFour>(frame, cluster, scratch, counts);
             return;
         }
         #[cfg(target_arch = "x86_64")]
@@ -55,7 +55,7 @@ impl InView {
                 scratch: &mut Vec<Shown>,
                 counts: &mut Counts,
             ) {
-                view.fill_by::<Wide>(frame, cluster, scratch, counts);
+                view.fill_by::<WideFour>(frame, cluster, scratch, counts);
             }
             #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
             // SAFETY: `wide` is set only where these instructions were detected.

@@ -7,11 +7,10 @@ use super::in_view::{InView, Shown};
 use super::lens::Lens;
 use super::scan::{Found, Raw, Raws, Rect, scan};
 use super::stats::Counts;
-use super::table::eight::{self, Eight};
 use super::table::{BATCH, Batch, Stretches, Table};
+use crate::simd::{Eight, Four, PlainEight, PlainFour};
 #[cfg(target_arch = "x86_64")]
-use crate::simd::Wide;
-use crate::simd::{Four, Plain};
+use crate::simd::{WideEight, WideFour};
 
 /// Pixels that a cluster is drawn in at once, across and down: what it makes there has to be remembered.
 const TILE: i32 = 128;
@@ -142,7 +141,7 @@ impl Projector {
         mut done: impl FnMut(usize, Segment),
     ) {
         if !frame.wide {
-            self.draw_by::<Plain>(frame, of, rect, early, counts, &mut done);
+            self.draw_by::<PlainFour>(frame, of, rect, early, counts, &mut done);
             return;
         }
         #[cfg(target_arch = "x86_64")]
@@ -157,7 +156,7 @@ impl Projector {
                 counts: &mut Counts,
                 done: &mut impl FnMut(usize, Segment),
             ) {
-                projector.draw_by::<Wide>(frame, of, rect, early, counts, done);
+                projector.draw_by::<WideFour>(frame, of, rect, early, counts, done);
             }
             #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
             // SAFETY: `wide` is set only where these instructions were detected.
@@ -224,14 +223,14 @@ impl Projector {
             self.shown.extend(cells);
             counts.scanned += self.shown.len() as u64;
             if !frame.wide {
-                self.collect::<Plain>(frame, of, rect, None);
+                self.collect::<PlainFour>(frame, of, rect, None);
                 continue;
             }
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
                 fn wide(projector: &mut Projector, frame: &Frame<'_>, of: Cluster<'_>, rect: &Rect) {
-                    projector.collect::<Wide>(frame, of, rect, None);
+                    projector.collect::<WideFour>(frame, of, rect, None);
                 }
                 #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
                 // SAFETY: `wide` is set only where these instructions were detected.
@@ -411,14 +410,14 @@ impl Projector {
 /// Integrates stretches and goes on with the runs of their pixels.
 fn go_on(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
     if !frame.wide {
-        go_on_by::<eight::Plain>(frame, raws, batch, open);
+        go_on_by::<PlainEight>(frame, raws, batch, open);
         return;
     }
     #[cfg(target_arch = "x86_64")]
     {
         #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
         fn wide(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
-            go_on_by::<eight::Wide>(frame, raws, batch, open);
+            go_on_by::<WideEight>(frame, raws, batch, open);
         }
         #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
         // SAFETY: `wide` is set only where these instructions were detected.

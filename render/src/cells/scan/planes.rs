@@ -10,7 +10,7 @@
 //! them, the ray is left to exact predicates (`sides`). So is a cell that is too flat to have such planes.
 
 use super::{Corner, FACES, Tetrahedron, scalars};
-use crate::simd::{Four, Plain};
+use crate::simd::{Four, PlainFour};
 
 /// Roundings, of which an error is made up at most, in units in the last place.
 const ROUNDINGS: f64 = 32.0 * f64::EPSILON;
@@ -38,7 +38,7 @@ pub(super) struct Planes {
 impl Planes {
     #[inline(always)]
     pub(super) fn new(corners: &[&Corner; 4]) -> Self {
-        Faces::<Plain>::new(corners).planes()
+        Faces::<PlainFour>::new(corners).planes()
     }
 
     #[inline(always)]

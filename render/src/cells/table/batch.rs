@@ -1,9 +1,9 @@
 //! Many segments at once, in steps that each go through all of them: what one step waits for is there by the next.
 
 use super::bins::{Bin, Bins, MARKED};
-use super::eight::Eight;
 use super::opacity::{behind, opacity};
 use super::{EVEN_COLOR, EVEN_DEPTH, Table};
+use crate::simd::Eight;
 
 /// Numbers that go through arithmetic together.
 const WIDE: usize = 8;

@@ -4,8 +4,8 @@
 //! of bins at the ends of a segment are not exact, and bins in which these would be off by more than [`SAME`] are marked.
 //! The width is such that control points fall between bins if any width near by has it so.
 
-use super::eight::Eight;
 use super::{Node, Piece};
+use crate::simd::Eight;
 
 /// Bins below the first control point: a constant one, and one that ends there.
 const BELOW: i32 = 2;

@@ -14,7 +14,6 @@
 
 mod batch;
 mod bins;
-pub(super) mod eight;
 mod make;
 mod opacity;
 mod parts;

@@ -1,5 +1,5 @@
-use super::eight::{Eight, Plain};
 use super::{BATCH, Batch, Stretches, Table};
+use crate::simd::{Eight, PlainEight};
 use crate::volume::{ControlPoint, Transfer};
 
 fn transfer(points: &[[f64; 5]], unit_mm: f64) -> Transfer {
@@ -132,7 +132,7 @@ fn some(transfer: &Transfer, state: &mut u64) -> ([f32; 2], f32) {
 }
 
 fn at_once(table: &Table, segments: &[([f32; 2], f32)]) -> Vec<[f32; 4]> {
-    at_once_by::<Plain>(table, segments)
+    at_once_by::<PlainEight>(table, segments)
 }
 
 fn at_once_by<E: Eight>(table: &Table, segments: &[([f32; 2], f32)]) -> Vec<[f32; 4]> {
@@ -182,7 +182,7 @@ fn wide_instructions_give_the_same() {
     for (name, transfer) in functions() {
         let table = Table::new(&transfer);
         let segments: Vec<_> = (0..BATCH - 3).map(|_| some(&transfer, &mut state)).collect();
-        let wide = at_once_by::<super::eight::Wide>(&table, &segments);
+        let wide = at_once_by::<crate::simd::WideEight>(&table, &segments);
         assert_eq!(at_once(&table, &segments), wide, "{name}");
     }
 }

@@ -1,19 +1,8 @@
-//! Which instructions the machine has, and four numbers at once by them.
+//! Four double numbers at once.
 
 use std::ops::{Add, Mul, Sub};
 
-/// Whether it has AVX2 and what goes with it.
-pub(crate) fn has_wide() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    {
-        is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("lzcnt")
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    false
-}
+use super::{PACKED, plain};
 
 /// Four numbers, each rounded as one alone is: all kinds give the same bits.
 pub(crate) trait Four: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
@@ -38,68 +27,11 @@ pub(crate) trait Four: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     fn put_f32(self, which: u32, into: &mut [f32; 4]);
 }
 
-/// The same of the whole numbers from `first` on.
-#[inline(always)]
-pub(crate) fn put_from(first: u32, which: u32, into: &mut [u32; 4]) {
-    for (place, n) in into.iter_mut().zip(PACKED[(which & 15) as usize]) {
-        *place = first + n;
-    }
-}
-
-/// By the bits set, their numbers.
-const PACKED: [[u32; 4]; 16] = packed();
-
-const fn packed() -> [[u32; 4]; 16] {
-    let mut packed = [[0; 4]; 16];
-    let mut which = 0;
-    while which < 16 {
-        let (mut bit, mut count) = (0, 0);
-        while bit < 4 {
-            if which >> bit & 1 == 1 {
-                packed[which][count] = bit as u32;
-                count += 1;
-            }
-            bit += 1;
-        }
-        which += 1;
-    }
-    packed
-}
-
 /// By whatever instructions there are.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Plain([f64; 4]);
 
-impl Plain {
-    #[inline(always)]
-    fn with(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
-        Self(std::array::from_fn(|n| of(self.0[n], other.0[n])))
-    }
-}
-
-impl Add for Plain {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.with(other, |a, b| a + b)
-    }
-}
-
-impl Sub for Plain {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.with(other, |a, b| a - b)
-    }
-}
-
-impl Mul for Plain {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.with(other, |a, b| a * b)
-    }
-}
+plain!(Plain, f64);
 
 impl Four for Plain {
     #[inline(always)]
@@ -181,9 +113,10 @@ mod wide {
     };
     use std::ops::{Add, Mul, Sub};
 
+    use super::super::wide;
     use super::{Four, PACKED};
 
-    /// By AVX2. Only code that is called where [`super::has_wide`] says yes names this type.
+    /// By AVX2. Only code that is called where `has_wide` says yes names this type.
     #[derive(Debug, Clone, Copy)]
     pub(crate) struct Wide(__m256d);
 
@@ -207,29 +140,7 @@ mod wide {
     // SAFETY, of all below: this type is only named where the instructions were detected; loads and stores are of arrays as
     // long as a register.
 
-    impl Add for Wide {
-        type Output = Self;
-        #[inline(always)]
-        fn add(self, other: Self) -> Self {
-            Self(unsafe { _mm256_add_pd(self.0, other.0) })
-        }
-    }
-
-    impl Sub for Wide {
-        type Output = Self;
-        #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            Self(unsafe { _mm256_sub_pd(self.0, other.0) })
-        }
-    }
-
-    impl Mul for Wide {
-        type Output = Self;
-        #[inline(always)]
-        fn mul(self, other: Self) -> Self {
-            Self(unsafe { _mm256_mul_pd(self.0, other.0) })
-        }
-    }
+    wide!(Wide, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd);
 
     impl Four for Wide {
         #[inline(always)]

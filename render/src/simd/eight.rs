@@ -1,11 +1,11 @@
-//! Eight numbers at once: twice red, green, blue and another, or one of each of eight stretches.
+//! Eight single numbers at once: twice red, green, blue and another, or one of each of eight things.
 
 use std::ops::{Add, Mul, Sub};
 
+use super::plain;
+
 /// Eight numbers, each rounded as one alone is: all kinds give the same bits.
-pub(in super::super) trait Eight:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
-{
+pub(crate) trait Eight: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     fn from_array(v: [f32; 8]) -> Self;
     fn to_array(self) -> [f32; 8];
     /// Of two halves.
@@ -32,38 +32,9 @@ pub(in super::super) trait Eight:
 
 /// By whatever instructions there are.
 #[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Plain([f32; 8]);
+pub(crate) struct Plain([f32; 8]);
 
-impl Plain {
-    #[inline(always)]
-    fn with(self, other: Self, of: impl Fn(f32, f32) -> f32) -> Self {
-        Self(std::array::from_fn(|n| of(self.0[n], other.0[n])))
-    }
-}
-
-impl Add for Plain {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.with(other, |a, b| a + b)
-    }
-}
-
-impl Sub for Plain {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.with(other, |a, b| a - b)
-    }
-}
-
-impl Mul for Plain {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.with(other, |a, b| a * b)
-    }
-}
+plain!(Plain, f32);
 
 impl Eight for Plain {
     #[inline(always)]
@@ -119,7 +90,7 @@ impl Eight for Plain {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub(in super::super) use wide::Wide;
+pub(crate) use wide::Wide;
 
 #[cfg(target_arch = "x86_64")]
 #[expect(
@@ -137,38 +108,17 @@ mod wide {
     };
     use std::ops::{Add, Mul, Sub};
 
+    use super::super::wide;
     use super::Eight;
 
     /// By AVX2. Only code that is called where `has_wide` says yes names this type.
     #[derive(Debug, Clone, Copy)]
-    pub(in super::super::super) struct Wide(__m256);
+    pub(crate) struct Wide(__m256);
 
     // SAFETY, of all below: this type is only named where the instructions were detected; loads and stores are of arrays as
     // long as a register.
 
-    impl Add for Wide {
-        type Output = Self;
-        #[inline(always)]
-        fn add(self, other: Self) -> Self {
-            Self(unsafe { _mm256_add_ps(self.0, other.0) })
-        }
-    }
-
-    impl Sub for Wide {
-        type Output = Self;
-        #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            Self(unsafe { _mm256_sub_ps(self.0, other.0) })
-        }
-    }
-
-    impl Mul for Wide {
-        type Output = Self;
-        #[inline(always)]
-        fn mul(self, other: Self) -> Self {
-            Self(unsafe { _mm256_mul_ps(self.0, other.0) })
-        }
-    }
+    wide!(Wide, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps);
 
     impl Eight for Wide {
         #[inline(always)]
