@@ -1,8 +1,9 @@
 //! A grid among volumes and surfaces: what each ray of some rows of the picture has of its cells, in order of depth, for a
 //! renderer that walks rays and adds up whatever they meet.
 //!
-//! The picture is divided, not the grid: every thread scan-converts the cells before its own rows. Nothing is merged
-//! before the ray is walked, so that a volume between or within cells needs no slices.
+//! The picture is divided, not the grid: every thread scan-converts the cells before its own rows. All stretches are integrated
+//! at once; nothing is merged before the ray is walked, so that a volume between or within cells needs no slices: a ray takes
+//! what is seen of a cell that it passes whole and alone, and only integrates itself where something else is in it.
 
 use std::ops::Range;
 
@@ -71,7 +72,8 @@ impl Strip {
         let (x, y) = (pixel % self.width, pixel / self.width);
         let block = x / BLOCK;
         let wide = BLOCK.min(self.width - block * BLOCK);
-        Spans { list: self.blocks[block].pixel(y * wide + x % BLOCK), table: &among.placed.table, near_mm }
+        let (list, seen) = self.blocks[block].pixel(y * wide + x % BLOCK);
+        Spans { list, seen, table: &among.placed.table, near_mm }
     }
 }
 
@@ -79,6 +81,8 @@ impl Strip {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Spans<'a> {
     list: &'a [Raw],
+    /// What is seen of each of the list, whole.
+    seen: &'a [[f32; 4]],
     table: &'a Table,
     near_mm: f64,
 }
@@ -142,25 +146,18 @@ impl Walker<'_> {
     /// Passes cells that lie whole and alone between two zetas, the first of which is where the last call ended, as long as
     /// `each` goes on from what is seen of each; where it stops.
     #[inline(always)]
-    pub(crate) fn run(
-        &mut self,
-        [from, to]: [f32; 2],
-        mm_per_zeta: f32,
-        mut each: impl FnMut([f32; 4]) -> bool,
-    ) -> f32 {
-        let Spans { list, table, .. } = self.spans;
+    pub(crate) fn run(&mut self, [from, to]: [f32; 2], mut each: impl FnMut([f32; 4]) -> bool) -> f32 {
+        let Spans { list, seen, .. } = self.spans;
         let mut at = from;
-        while let (true, Some(raw)) = (self.open.is_empty(), list.get(self.next)) {
+        while let (true, Some(raw), Some(&seen)) =
+            (self.open.is_empty(), list.get(self.next), seen.get(self.next))
+        {
             let back = self.spans.zeta(raw.back);
             let overlaps = list.get(self.next + 1).is_some_and(|next| next.front < raw.back);
             if overlaps || back > to || self.spans.zeta(raw.front) < at {
                 break;
             }
-            let [a, b] = raw.values;
-            let begin = table.at(a, &self.place);
-            let end = table.at(b, &begin);
-            let seen = table.segment(&begin, &end, (raw.back - raw.front) as f32 * mm_per_zeta);
-            (self.place, at) = (end, back);
+            at = back;
             self.next += 1;
             if !each(seen) {
                 break;

@@ -99,14 +99,45 @@ pub(super) struct Gathered {
     /// Where each pixel's end, row by row.
     ends: Vec<u32>,
     raws: Vec<Raw>,
+    /// What is seen of each.
+    seen: Vec<[f32; 4]>,
 }
 
 impl Gathered {
-    /// What the ray of a pixel has, nearest first.
+    /// What the ray of a pixel has, nearest first, and what is seen of each.
     #[inline(always)]
-    pub(super) fn pixel(&self, pixel: usize) -> &[Raw] {
+    pub(super) fn pixel(&self, pixel: usize) -> (&[Raw], &[[f32; 4]]) {
         let from = if pixel == 0 { 0 } else { self.ends[pixel - 1] };
-        &self.raws[from as usize..self.ends[pixel] as usize]
+        let range = from as usize..self.ends[pixel] as usize;
+        (&self.raws[range.clone()], &self.seen[range])
+    }
+
+    /// Integrates all that the rays of `rect` have.
+    #[inline(always)]
+    fn integrate<E: Eight>(&mut self, frame: &Frame<'_>, rect: &Rect) {
+        let mut batch = Batch::new();
+        let (mut from, mut to, mut mm) = ([0.0; BATCH], [0.0; BATCH], [0.0; BATCH]);
+        let [across, _] = rect.size();
+        self.seen.clear();
+        self.seen.reserve(self.raws.len());
+        let stretch = |pixel: u32| {
+            let [x, y] = [pixel as usize % across, pixel as usize / across];
+            frame.lens.stretch([rect.low[0] + x as i32, rect.low[1] + y as i32])
+        };
+        let mut last = (0, stretch(0));
+        for raws in self.raws.chunks(BATCH) {
+            for (n, raw) in raws.iter().enumerate() {
+                if raw.pixel != last.0 {
+                    last = (raw.pixel, stretch(raw.pixel));
+                }
+                [from[n], to[n]] = raw.values;
+                mm[n] = length(raw.back - raw.front, last.1);
+            }
+            let count = raws.len();
+            let all = Stretches { from: &from[..count], to: &to[..count], mm: &mm[..count] };
+            frame.table.segments::<E>(&mut batch, all);
+            self.seen.extend(&batch.seen()[..count]);
+        }
     }
 }
 
@@ -248,6 +279,22 @@ impl Projector {
         }
         std::mem::swap(&mut self.counts, &mut gathered.ends);
         std::mem::swap(&mut self.ordered, &mut gathered.raws);
+        if !frame.wide {
+            gathered.integrate::<PlainEight>(frame, rect);
+            return;
+        }
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+            fn wide(gathered: &mut Gathered, frame: &Frame<'_>, rect: &Rect) {
+                gathered.integrate::<WideEight>(frame, rect);
+            }
+            #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
+            // SAFETY: `wide` is set only where these instructions were detected.
+            unsafe {
+                wide(gathered, frame, rect);
+            }
+        }
     }
 
     /// Puts what was scan-converted together by pixel; `counts` become where each pixel's end.

@@ -270,7 +270,7 @@ fn march_many(
     let mut at = from;
     loop {
         if let ([], [grid]) = (&walkers, &mut *cells) {
-            at = grid.run([at, to], ray.mm_per_zeta, |seen| {
+            at = grid.run([at, to], |seen| {
                 light.layer(seen);
                 light.through >= manner.dark
             });
