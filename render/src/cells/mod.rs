@@ -47,6 +47,7 @@ mod lists;
 pub mod mpi;
 mod orders;
 mod project;
+mod runs;
 mod scan;
 mod serve;
 mod split;

@@ -2,9 +2,11 @@
 
 use super::clusters::{Clusters, Scalars};
 use super::early;
-use super::fold::{Segment, add_up, integrate, length, merge, overlap, sort, under};
+use super::fold::{Segment, add_up, integrate, length, merge, overlap, sort};
+
 use super::in_view::{InView, Shown};
 use super::lens::Lens;
+use super::runs::{MIXED, NONE, Open, Run, go_on};
 use super::scan::{Found, Raw, Raws, Rect, scan};
 use super::stats::Counts;
 use super::table::{BATCH, Batch, Stretches, Table};
@@ -48,50 +50,6 @@ impl Frame<'_> {
         (rect, nearest)
     }
 }
-
-/// What pixels have of a cluster while its tetrahedra are gone through.
-#[derive(Debug, Default)]
-struct Open {
-    /// The run that was last gone on with.
-    runs: Vec<Run>,
-    /// The last of those put aside, or [`NONE`], or [`MIXED`].
-    last: Vec<u32>,
-    /// Runs put aside, each with the one before it.
-    aside: Vec<(Segment, u32)>,
-    /// Millimetres for one of depth, where that is not one everywhere.
-    stretches: Vec<f64>,
-}
-
-/// A run of a pixel, within a line of a cache.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(32))]
-struct Run(Segment);
-
-impl Run {
-    /// Where there is none: nothing, that ends before all and begins after.
-    const NONE: Self = Self(Segment { front: f64::INFINITY, back: -1.0, rgba: [0.0; 4] });
-}
-
-impl Open {
-    /// For the pixels of a tile, with nothing in them.
-    fn begin(&mut self, lens: &Lens, tile: &Rect) {
-        self.runs.clear();
-        self.runs.resize(tile.area(), Run::NONE);
-        self.last.clear();
-        self.last.resize(tile.area(), NONE);
-        self.aside.clear();
-        self.stretches.clear();
-        if lens.perspective() {
-            for y in tile.low[1]..tile.high[1] {
-                self.stretches.extend((tile.low[0]..tile.high[0]).map(|x| lens.stretch([x, y])));
-            }
-        }
-    }
-}
-
-const NONE: u32 = u32::MAX;
-/// Cells overlap here: their stretches are needed one by one.
-const MIXED: u32 = u32::MAX - 1;
 
 /// What the rays of a rectangle have of a grid.
 #[derive(Debug, Default)]
@@ -450,67 +408,6 @@ impl Projector {
                     }
                 });
             }
-        }
-    }
-}
-
-/// Integrates stretches and goes on with the runs of their pixels.
-fn go_on(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
-    if !frame.wide {
-        go_on_by::<PlainEight>(frame, raws, batch, open);
-        return;
-    }
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-        fn wide(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
-            go_on_by::<WideEight>(frame, raws, batch, open);
-        }
-        #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
-        // SAFETY: `wide` is set only where these instructions were detected.
-        unsafe {
-            wide(frame, raws, batch, open);
-        }
-    }
-}
-
-#[inline(always)]
-fn go_on_by<E: Eight>(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
-    let mut mm = [0.0; BATCH];
-    for first in (0..raws.len()).step_by(BATCH) {
-        let raws = raws.part(first, BATCH);
-        let mm = &mut mm[..raws.len()];
-        let spans = raws.fronts.iter().zip(raws.backs).map(|(front, back)| back - front);
-        if frame.lens.perspective() {
-            for ((mm, span), &pixel) in mm.iter_mut().zip(spans).zip(raws.pixels) {
-                *mm = length(span, open.stretches[pixel as usize]);
-            }
-        } else {
-            for (mm, span) in mm.iter_mut().zip(spans) {
-                *mm = length(span, 1.0);
-            }
-        }
-        frame.table.segments::<E>(batch, Stretches { from: raws.from, to: raws.to, mm });
-        for (n, (&pixel, &rgba)) in raws.pixels.iter().zip(batch.seen()).enumerate() {
-            let Run(run) = &mut open.runs[pixel as usize];
-            let [front, back] = [raws.fronts[n], raws.backs[n]];
-            // A run begins with nothing, as it goes on.
-            if front == run.back || run.back < 0.0 {
-                run.front = if front < run.front { front } else { run.front };
-                run.back = back;
-                under(&mut run.rgba, rgba);
-                continue;
-            }
-            let mut new = Segment { front, back, rgba };
-            if back == run.front {
-                under(&mut new.rgba, run.rgba);
-                new.back = run.back;
-            } else {
-                let last = &mut open.last[pixel as usize];
-                open.aside.push((*run, *last));
-                *last = (open.aside.len() - 1) as u32;
-            }
-            *run = new;
         }
     }
 }
