@@ -46,13 +46,7 @@ pub(super) fn in_view(frame: &Frame<'_>) -> (Vec<Near>, Counts) {
     let mut counts = Counts::default();
     let mut shown = Vec::new();
     for cluster in 0..frame.clusters.len() {
-        let (reach, nearest) = frame.reach(cluster);
-        let count = frame.clusters.count(cluster) as u64;
-        if reach.is_empty() {
-            counts.outside += count;
-        } else if frame.skip_clear && frame.table.is_clear(frame.scalars.range(cluster)) {
-            counts.clear += count;
-        } else {
+        if let Some((reach, nearest)) = frame.shows(cluster, &mut counts) {
             // Bits of floats are in their order where they are not negative.
             shown.push((nearest.max(0.0).to_bits(), cluster, reach));
         }

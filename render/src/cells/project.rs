@@ -3,7 +3,6 @@
 use super::clusters::{Clusters, Scalars};
 use super::early;
 use super::fold::{Segment, add_up, integrate, length, merge, overlap, sort};
-
 use super::in_view::{InView, Shown};
 use super::lens::Lens;
 use super::runs::{MIXED, NONE, Open, Run, go_on};
@@ -48,6 +47,21 @@ impl Frame<'_> {
             rect.high = rect.low;
         }
         (rect, nearest)
+    }
+
+    /// The same of a cluster that may show; all cells of another are counted.
+    pub(super) fn shows(&self, cluster: usize, counts: &mut Counts) -> Option<(Rect, f64)> {
+        let count = self.clusters.count(cluster) as u64;
+        let (reach, nearest) = self.reach(cluster);
+        if reach.is_empty() {
+            counts.outside += count;
+            return None;
+        }
+        if self.skip_clear && self.table.is_clear(self.scalars.range(cluster)) {
+            counts.clear += count;
+            return None;
+        }
+        Some((reach, nearest))
     }
 }
 

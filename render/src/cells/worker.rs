@@ -357,18 +357,9 @@ impl<'a, L: Link> Worker<'a, L> {
         let counts = &mut self.gathered.counts[rank];
         counts.clusters += 1;
         let frame = self.frame;
-        let count = frame.clusters.count(cluster) as u64;
-        let (reach, nearest) = frame.reach(cluster);
-        if reach.is_empty() {
-            counts.outside += count;
-            return;
-        }
-        if frame.skip_clear && frame.table.is_clear(frame.scalars.range(cluster)) {
-            counts.clear += count;
-            return;
-        }
+        let Some((reach, nearest)) = frame.shows(cluster, counts) else { return };
         if self.table.as_ref().is_some_and(|table| table.hides(&reach, nearest)) {
-            counts.hidden += count;
+            counts.hidden += frame.clusters.count(cluster) as u64;
             return;
         }
         self.view.fill(frame, cluster, &mut self.scratch, counts);

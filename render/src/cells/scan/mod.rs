@@ -242,7 +242,8 @@ fn scalars((corners, constant): &Tetrahedron<'_>) -> [f64; 4] {
     constant.map_or([p.scalar, q.scalar, r.scalar, s.scalar], |value| [value; 4])
 }
 
-/// Finds what the rays of `reach`, which lies within `rect`, have of a tetrahedron. Pixels are counted in `rect`. Whenever much is gathered it goes to `full`; what is left stays in `raws`.
+/// Finds what the rays of `reach`, which lies within `rect`, have of a tetrahedron. Pixels are counted in `rect`. Whenever
+/// much is gathered it goes to `full`; what is left stays in `raws`.
 #[inline(always)]
 pub(super) fn scan<F: Four>(
     of: Tetrahedron<'_>,
