@@ -103,7 +103,7 @@ impl<'a> Spans<'a> {
     }
 
     pub(crate) fn walker(self) -> Walker<'a> {
-        Walker { spans: self, next: 0, open: Vec::new(), place: *self.table.start() }
+        Walker { spans: self, next: 0, open: Vec::new(), place: Place::NOWHERE }
     }
 }
 

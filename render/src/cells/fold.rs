@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use super::lists::Lists;
 use super::scan::Raw;
 use super::stats::Counts;
-use super::table::{Table, opacity};
+use super::table::{Place, Table, opacity};
 use super::worker::Row;
 
 /// A stretch of a pixel's ray with what is seen of it.
@@ -107,7 +107,7 @@ fn is_before(a: &Raw, b: &Raw) -> bool {
 /// Integrates what a ray has of cells, in their order; `stretch` is mm for one of depth.
 #[inline(always)]
 pub(super) fn integrate(raws: &[Raw], table: &Table, stretch: f64, into: &mut Vec<Segment>) {
-    let mut last = *table.start();
+    let mut last = Place::NOWHERE;
     for raw in raws {
         let from = table.at(raw.values[0], &last);
         last = table.at(raw.values[1], &from);

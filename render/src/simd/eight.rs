@@ -1,4 +1,4 @@
-//! Eight single numbers at once: twice red, green, blue and another, or one of each of eight things.
+//! Eight single numbers at once, one of each of eight things.
 
 use std::ops::{Add, Mul, Sub};
 
@@ -6,28 +6,31 @@ use super::plain;
 
 /// Eight numbers, each rounded as one alone is: all kinds give the same bits.
 pub(crate) trait Eight: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// Eight whole numbers.
+    type Numbers: Copy;
+
     fn from_array(v: [f32; 8]) -> Self;
     fn to_array(self) -> [f32; 8];
-    /// Of two halves.
-    fn of(low: &[f32; 4], high: &[f32; 4]) -> Self;
-    /// Writes the halves.
-    fn put(self, low: &mut [f32; 4], high: &mut [f32; 4]);
+    fn all(v: f32) -> Self;
     fn over(self, other: Self) -> Self;
     fn abs(self) -> Self;
     /// One number or another, by whether these are less than those of a limit.
     fn below(self, limit: Self, yes: Self, no: Self) -> Self;
-    /// In each half: each two bits of `ORDER` say which comes there, the lowest first.
-    fn picked<const ORDER: i32>(self) -> Self;
-    /// The last of each half of all: those of the lower halves, then those of the upper.
-    fn lasts(all: [Self; 4]) -> Self;
-    /// With nothing for the last of each half.
-    fn without_lasts(self) -> Self;
+    /// Which are less than those of a limit, a bit each.
+    fn bits_below(self, limit: Self) -> u32;
+    /// Writes four of each, together for each of eight.
+    fn put_rows(of: [Self; 4], low: &mut [[f32; 4]], high: &mut [[f32; 4]]);
 
-    /// In each half its first everywhere, then its second and so on.
-    #[inline(always)]
-    fn spread(self) -> [Self; 4] {
-        [self.picked::<0x00>(), self.picked::<0x55>(), self.picked::<0xaa>(), self.picked::<0xff>()]
-    }
+    fn numbers(v: [u32; 8]) -> Self::Numbers;
+    fn numbers_to_array(numbers: Self::Numbers) -> [u32; 8];
+    /// How many of a rising list each has reached, but for the first, which all have.
+    fn reached(self, rising: &[f32; 8]) -> Self::Numbers;
+    /// Which are not one, a bit each.
+    fn differ(a: Self::Numbers, b: Self::Numbers) -> u32;
+    /// Looked up by numbers below eight.
+    fn of_table(table: &[f32; 8], numbers: Self::Numbers) -> Self;
+    /// The first of all rows, then the second of all, and so on.
+    fn columns(rows: [&[f32; 8]; 8]) -> [Self; 8];
 }
 
 /// By whatever instructions there are.
@@ -37,6 +40,8 @@ pub(crate) struct Plain([f32; 8]);
 plain!(Plain, f32);
 
 impl Eight for Plain {
+    type Numbers = [u32; 8];
+
     #[inline(always)]
     fn from_array(v: [f32; 8]) -> Self {
         Self(v)
@@ -48,14 +53,8 @@ impl Eight for Plain {
     }
 
     #[inline(always)]
-    fn of(low: &[f32; 4], high: &[f32; 4]) -> Self {
-        Self(std::array::from_fn(|n| if n < 4 { low[n] } else { high[n - 4] }))
-    }
-
-    #[inline(always)]
-    fn put(self, low: &mut [f32; 4], high: &mut [f32; 4]) {
-        low.copy_from_slice(&self.0[..4]);
-        high.copy_from_slice(&self.0[4..]);
+    fn all(v: f32) -> Self {
+        Self([v; 8])
     }
 
     #[inline(always)]
@@ -74,18 +73,45 @@ impl Eight for Plain {
     }
 
     #[inline(always)]
-    fn picked<const ORDER: i32>(self) -> Self {
-        Self(std::array::from_fn(|n| self.0[(n & 4) + (ORDER >> (2 * (n & 3)) & 3) as usize]))
+    fn bits_below(self, limit: Self) -> u32 {
+        (0..8).fold(0, |bits, n| bits | u32::from(self.0[n] < limit.0[n]) << n)
     }
 
     #[inline(always)]
-    fn lasts(all: [Self; 4]) -> Self {
-        Self(std::array::from_fn(|n| all[n & 3].0[n | 3]))
+    fn put_rows(of: [Self; 4], low: &mut [[f32; 4]], high: &mut [[f32; 4]]) {
+        for (n, row) in low.iter_mut().chain(high).enumerate() {
+            *row = of.map(|of| of.0[n]);
+        }
     }
 
     #[inline(always)]
-    fn without_lasts(self) -> Self {
-        Self(std::array::from_fn(|n| if n & 3 == 3 { 0.0 } else { self.0[n] }))
+    fn numbers(v: [u32; 8]) -> [u32; 8] {
+        v
+    }
+
+    #[inline(always)]
+    fn numbers_to_array(numbers: [u32; 8]) -> [u32; 8] {
+        numbers
+    }
+
+    #[inline(always)]
+    fn reached(self, rising: &[f32; 8]) -> [u32; 8] {
+        self.0.map(|v| rising[1..].iter().fold(0, |count, begin| count + u32::from(*begin <= v)))
+    }
+
+    #[inline(always)]
+    fn differ(a: [u32; 8], b: [u32; 8]) -> u32 {
+        (0..8).fold(0, |bits, n| bits | u32::from(a[n] != b[n]) << n)
+    }
+
+    #[inline(always)]
+    fn of_table(table: &[f32; 8], numbers: [u32; 8]) -> Self {
+        Self(numbers.map(|number| table[number as usize & 7]))
+    }
+
+    #[inline(always)]
+    fn columns(rows: [&[f32; 8]; 8]) -> [Self; 8] {
+        std::array::from_fn(|column| Self(rows.map(|row| row[column])))
     }
 }
 
@@ -100,11 +126,13 @@ pub(crate) use wide::Wide;
 )]
 mod wide {
     use std::arch::x86_64::{
-        __m256, _CMP_LT_OQ, _mm_loadu_ps, _mm_storeu_ps, _mm256_add_ps, _mm256_andnot_ps, _mm256_blend_ps,
-        _mm256_blendv_ps, _mm256_castpd_ps, _mm256_castps_pd, _mm256_castps256_ps128, _mm256_cmp_ps,
-        _mm256_div_ps, _mm256_extractf128_ps, _mm256_loadu_ps, _mm256_mul_ps, _mm256_permute_ps,
-        _mm256_set_m128, _mm256_set1_ps, _mm256_setzero_ps, _mm256_storeu_ps, _mm256_sub_ps,
-        _mm256_unpackhi_pd, _mm256_unpackhi_ps,
+        __m256, __m256i, _CMP_LE_OQ, _CMP_LT_OQ, _mm_storeu_ps, _mm256_add_ps, _mm256_andnot_ps,
+        _mm256_blendv_ps, _mm256_castpd_ps, _mm256_castps_pd, _mm256_castps_si256, _mm256_castps256_ps128,
+        _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_div_ps, _mm256_extractf128_ps,
+        _mm256_loadu_ps, _mm256_loadu_si256, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps,
+        _mm256_permutevar8x32_ps, _mm256_set1_ps, _mm256_setzero_si256, _mm256_storeu_ps,
+        _mm256_storeu_si256, _mm256_sub_epi32, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps,
+        _mm256_unpacklo_pd, _mm256_unpacklo_ps,
     };
     use std::ops::{Add, Mul, Sub};
 
@@ -120,7 +148,46 @@ mod wide {
 
     wide!(Wide, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps);
 
+    /// In each half, the first two of `a` and `b` by turns, and the last two.
+    #[inline(always)]
+    fn by_turns(a: Wide, b: Wide) -> [Wide; 2] {
+        unsafe { [Wide(_mm256_unpacklo_ps(a.0, b.0)), Wide(_mm256_unpackhi_ps(a.0, b.0))] }
+    }
+
+    /// The same by twos.
+    #[inline(always)]
+    fn twos_by_turns(a: Wide, b: Wide) -> [Wide; 2] {
+        unsafe {
+            let (a, b) = (_mm256_castps_pd(a.0), _mm256_castps_pd(b.0));
+            let [low, high] = [_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b)];
+            [Wide(_mm256_castpd_ps(low)), Wide(_mm256_castpd_ps(high))]
+        }
+    }
+
+    /// In each half, of four that each have one of each row: the rows.
+    #[inline(always)]
+    fn transposed([a, b, c, d]: [Wide; 4]) -> [Wide; 4] {
+        let ([ab, ab_high], [cd, cd_high]) = (by_turns(a, b), by_turns(c, d));
+        let ([first, second], [third, last]) = (twos_by_turns(ab, cd), twos_by_turns(ab_high, cd_high));
+        [first, second, third, last]
+    }
+
+    /// The first halves of two, and the second.
+    #[inline(always)]
+    fn halves(a: Wide, b: Wide) -> [Wide; 2] {
+        unsafe {
+            [Wide(_mm256_permute2f128_ps::<0x20>(a.0, b.0)), Wide(_mm256_permute2f128_ps::<0x31>(a.0, b.0))]
+        }
+    }
+
+    #[inline(always)]
+    fn load(row: &[f32; 8]) -> Wide {
+        Wide(unsafe { _mm256_loadu_ps(row.as_ptr()) })
+    }
+
     impl Eight for Wide {
+        type Numbers = __m256i;
+
         #[inline(always)]
         fn from_array(v: [f32; 8]) -> Self {
             Self(unsafe { _mm256_loadu_ps(v.as_ptr()) })
@@ -134,16 +201,8 @@ mod wide {
         }
 
         #[inline(always)]
-        fn of(low: &[f32; 4], high: &[f32; 4]) -> Self {
-            Self(unsafe { _mm256_set_m128(_mm_loadu_ps(high.as_ptr()), _mm_loadu_ps(low.as_ptr())) })
-        }
-
-        #[inline(always)]
-        fn put(self, low: &mut [f32; 4], high: &mut [f32; 4]) {
-            unsafe {
-                _mm_storeu_ps(low.as_mut_ptr(), _mm256_castps256_ps128(self.0));
-                _mm_storeu_ps(high.as_mut_ptr(), _mm256_extractf128_ps::<1>(self.0));
-            }
+        fn all(v: f32) -> Self {
+            Self(unsafe { _mm256_set1_ps(v) })
         }
 
         #[inline(always)]
@@ -162,22 +221,64 @@ mod wide {
         }
 
         #[inline(always)]
-        fn picked<const ORDER: i32>(self) -> Self {
-            Self(unsafe { _mm256_permute_ps::<ORDER>(self.0) })
+        fn bits_below(self, limit: Self) -> u32 {
+            unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, limit.0)) as u32 }
         }
 
         #[inline(always)]
-        fn lasts([a, b, c, d]: [Self; 4]) -> Self {
-            unsafe {
-                let ab = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
-                let cd = _mm256_castps_pd(_mm256_unpackhi_ps(c.0, d.0));
-                Self(_mm256_castpd_ps(_mm256_unpackhi_pd(ab, cd)))
+        fn put_rows(of: [Self; 4], low: &mut [[f32; 4]], high: &mut [[f32; 4]]) {
+            let rows = transposed(of);
+            for ((row, low), high) in rows.into_iter().zip(low).zip(high) {
+                unsafe {
+                    _mm_storeu_ps(low.as_mut_ptr(), _mm256_castps256_ps128(row.0));
+                    _mm_storeu_ps(high.as_mut_ptr(), _mm256_extractf128_ps::<1>(row.0));
+                }
             }
         }
 
         #[inline(always)]
-        fn without_lasts(self) -> Self {
-            Self(unsafe { _mm256_blend_ps::<0x88>(self.0, _mm256_setzero_ps()) })
+        fn numbers(v: [u32; 8]) -> __m256i {
+            unsafe { _mm256_loadu_si256(v.as_ptr().cast()) }
+        }
+
+        #[inline(always)]
+        fn numbers_to_array(numbers: __m256i) -> [u32; 8] {
+            let mut v = [0; 8];
+            unsafe { _mm256_storeu_si256(v.as_mut_ptr().cast(), numbers) };
+            v
+        }
+
+        #[inline(always)]
+        fn reached(self, rising: &[f32; 8]) -> __m256i {
+            unsafe {
+                let mut count = _mm256_setzero_si256();
+                for begin in &rising[1..] {
+                    // What is so is all ones, which is one less than nothing.
+                    let reached = _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_set1_ps(*begin), self.0);
+                    count = _mm256_sub_epi32(count, _mm256_castps_si256(reached));
+                }
+                count
+            }
+        }
+
+        #[inline(always)]
+        fn differ(a: __m256i, b: __m256i) -> u32 {
+            unsafe { !_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(a, b))) as u32 & 0xff }
+        }
+
+        #[inline(always)]
+        fn of_table(table: &[f32; 8], numbers: __m256i) -> Self {
+            Self(unsafe { _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.as_ptr()), numbers) })
+        }
+
+        #[inline(always)]
+        fn columns(rows: [&[f32; 8]; 8]) -> [Self; 8] {
+            let [a, b, c, d, e, f, g, h] = rows;
+            let low = transposed([load(a), load(b), load(c), load(d)]);
+            let high = transposed([load(e), load(f), load(g), load(h)]);
+            let ([a, e], [b, f]) = (halves(low[0], high[0]), halves(low[1], high[1]));
+            let ([c, g], [d, h]) = (halves(low[2], high[2]), halves(low[3], high[3]));
+            [a, b, c, d, e, f, g, h]
         }
     }
 }

@@ -1,68 +1,21 @@
-//! Many segments at once, in steps that each go through all of them: what one step waits for is there by the next.
+//! Many segments at once: those within one piece, and after that those that pass from one into another.
 
-use super::bins::{Bin, Bins, MARKED};
-use super::opacity::{behind, opacity};
-use super::{EVEN_COLOR, EVEN_DEPTH, Table};
-use crate::simd::Eight;
+use super::lanes::{Many, Means, Source};
+use super::opacity::{THIN, behind, opacity, thin};
+use super::{EVEN_COLOR, EVEN_DEPTH, Place, Table};
+use crate::simd::{Eight, put_from};
 
 /// Numbers that go through arithmetic together.
 const WIDE: usize = 8;
 /// Segments that go at once.
 pub(in super::super) const BATCH: usize = 88;
-/// Bins apart from which on sums have kept their digits.
-const APART: f32 = 1.0 / 32.0;
-
-/// One of each of several segments, where no access of memory straddles two lines of a cache.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(32))]
-struct Each<T>([[T; WIDE]; BATCH / WIDE]);
-
-/// Where an end of each of several segments lies: its bin, and how many bins behind the begin of that.
-#[derive(Debug)]
-struct Ends {
-    bin: Each<u32>,
-    part: Each<f32>,
-}
-
-impl Ends {
-    fn new() -> Self {
-        Self { bin: Each([[0; WIDE]; BATCH / WIDE]), part: Each([[0.0; WIDE]; BATCH / WIDE]) }
-    }
-
-    /// Looks positions up; where they are in bins, and the numbers of the bins.
-    #[inline(always)]
-    fn look_up(&mut self, bins: &Bins, positions: &[f32; WIDE], k: usize) -> ([f64; WIDE], [f32; WIDE]) {
-        // Added and taken away again, it leaves the nearest whole number, which then is in its lowest digits.
-        const WHOLE: f64 = 6_755_399_441_055_744.0;
-        let [first, last] = bins.range;
-        let (mut at, mut begin) = ([0.0; WIDE], [0.0; WIDE]);
-        for n in 0..WIDE {
-            let x = f64::from(positions[n]) * bins.scale;
-            let low = if x > first { x } else { first };
-            let kept = if low < last { low } else { last };
-            let nearest = (kept + WHOLE) - WHOLE;
-            begin[n] = if nearest > kept { nearest - 1.0 } else { nearest };
-            at[n] = x;
-        }
-        let mut number = [0.0; WIDE];
-        for n in 0..WIDE {
-            self.part.0[k][n] = (at[n] - begin[n]) as f32;
-            number[n] = (begin[n] - first) as f32;
-            self.bin.0[k][n] = ((begin[n] - first) + WHOLE).to_bits() as u32;
-        }
-        (at, number)
-    }
-}
 
 /// Several segments, and what is seen of them.
 #[derive(Debug)]
 pub(in super::super) struct Batch {
-    from: Ends,
-    to: Ends,
-    /// What the difference of sums counts, and the sum of rates.
-    apart: Each<f32>,
-    near: Each<f32>,
-    sums: [Sums; BATCH / WIDE],
+    /// Those that pass from one piece into another.
+    across: [u32; BATCH + WIDE],
+    count: usize,
     /// Colour, premultiplied, and opacity.
     seen: [[f32; 4]; BATCH],
 }
@@ -75,51 +28,16 @@ pub(in super::super) struct Stretches<'a> {
     pub(in super::super) mm: &'a [f32],
 }
 
-/// What [`WIDE`] segments have.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(32))]
-struct Sums {
-    /// Optical depth times colour, and optical depth; those of the nth segment with those of the fourth after it.
-    depth: [[f32; WIDE]; 4],
-    /// The colour at the end less that at the begin, and how much it varies all along.
-    turn: [[f32; WIDE]; 4],
-    /// How much more extinction there is at the end than at the begin.
-    rise: [f32; WIDE],
-    /// Differences of the ramps, and marks.
-    ramps: [u32; WIDE],
-}
-
-/// What two segments have.
-struct Two<E> {
-    depth: E,
-    turn: E,
-    rise: E,
-}
-
-impl<E: Eight> Two<E> {
-    /// From the bins of their begins and of their ends, how far behind these they are, and what differences of sums and the
-    /// sums of rates count.
-    #[inline(always)]
-    fn new([p, q]: [[&Bin; 2]; 2], parts: [E; 2], [apart, near]: [E; 2]) -> Self {
-        let begin = p[0].within(p[1], parts[0]);
-        let end = q[0].within(q[1], parts[1]);
-        Self {
-            depth: end.since(&begin) * apart + (begin.rate + end.rate) * near,
-            turn: end.light - begin.light,
-            rise: end.rate - begin.rate,
-        }
-    }
-}
-
 /// [`WIDE`] of a list, with nothing for what it lacks.
 #[inline(always)]
-fn eight<'a>(of: &'a [f32], k: usize, padded: &'a mut [f32; WIDE]) -> &'a [f32; WIDE] {
+fn eight<E: Eight>(of: &[f32], k: usize) -> E {
     let of = &of[k * WIDE..];
     if let Some(all) = of.first_chunk() {
-        return all;
+        return E::from_array(*all);
     }
-    pad(of, padded);
-    padded
+    let mut padded = [0.0; WIDE];
+    pad(of, &mut padded);
+    E::from_array(padded)
 }
 
 #[cold]
@@ -128,20 +46,50 @@ fn pad(of: &[f32], padded: &mut [f32; WIDE]) {
     padded[..of.len()].copy_from_slice(of);
 }
 
+/// What is seen of stretches of even extinction, red, green, blue and opacity; and which have to be seen to by themselves.
+#[inline(always)]
+fn shade<E: Eight>(means: &Means<E>, mm: E) -> ([E; 4], u32) {
+    let [r, g, b, rate] = means.rates;
+    let none = E::all(0.0);
+    let tau = rate * mm;
+    // Rounding may leave less than nothing.
+    let tau = tau.below(none, none, tau);
+    let (mut parts, mut lags, mut opacities) = ([0.0; WIDE], [0.0; WIDE], [0.0; WIDE]);
+    let taus = tau.to_array();
+    for n in 0..WIDE {
+        [parts[n], lags[n], opacities[n]] = thin(taus[n]);
+    }
+    if tau.bits_below(E::all(THIN)) != 0xff {
+        for n in 0..WIDE {
+            let tau = taus[n];
+            let is_thin = tau < THIN;
+            let opacity = opacity(tau);
+            parts[n] = if is_thin { parts[n] } else { opacity / tau };
+            lags[n] = if is_thin { lags[n] } else { behind(tau, opacity) };
+            opacities[n] = if is_thin { opacities[n] } else { opacity };
+        }
+    }
+    let (parts, lags) = (none.below(tau, E::from_array(parts) * mm, none), E::from_array(lags));
+    let [x, y, z] = means.turn;
+    let seen = [r * parts + x * lags, g * parts + y * lags, b * parts + z * lags, E::from_array(opacities)];
+    // What is no number is not smooth.
+    let smooth = (means.rough * mm).bits_below(E::all(EVEN_DEPTH)) & tau.bits_below(E::all(f32::INFINITY));
+    (seen, !smooth & 0xff)
+}
+
+/// Puts others under what is seen.
+#[inline(always)]
+fn under<E: Eight>(seen: &mut [E; 4], behind: [E; 4]) {
+    let through = E::all(1.0) - seen[3];
+    for (seen, behind) in seen.iter_mut().zip(behind) {
+        *seen = *seen + through * behind;
+    }
+}
+
 impl Batch {
     /// With nothing in it.
     pub(in super::super) fn new() -> Self {
-        let each = Each([[0.0; WIDE]; BATCH / WIDE]);
-        let eights = [[0.0; WIDE]; 4];
-        let sums = Sums { depth: eights, turn: eights, rise: [0.0; WIDE], ramps: [0; WIDE] };
-        Self {
-            from: Ends::new(),
-            to: Ends::new(),
-            apart: each,
-            near: each,
-            sums: [sums; BATCH / WIDE],
-            seen: [[0.0; 4]; BATCH],
-        }
+        Self { across: [0; BATCH + WIDE], count: 0, seen: [[0.0; 4]; BATCH] }
     }
 
     /// Colour, premultiplied, and opacity of what was last integrated.
@@ -150,130 +98,122 @@ impl Batch {
         &self.seen
     }
 
+    /// Integrates as if each were within a piece, and notes which are not.
     #[inline(always)]
-    fn look_up<E: Eight>(&mut self, bins: &Bins, of: Stretches<'_>, k: usize) {
-        let mut padded = [[0.0; WIDE]; 3];
-        let [pad_from, pad_to, pad_mm] = &mut padded;
-        let (a, first) = self.from.look_up(bins, eight(of.from, k, pad_from), k);
-        let (b, last) = self.to.look_up(bins, eight(of.to, k, pad_to), k);
-        let mut rise = [0.0; WIDE];
-        for n in 0..WIDE {
-            rise[n] = (b[n] - a[n]) as f32;
+    fn within<E: Eight>(&mut self, source: &impl Source<E>, of: Stretches<'_>, k: usize) -> u32 {
+        let (from, to) = (eight::<E>(of.from, k), eight::<E>(of.to, k));
+        let numbers = source.numbers(from);
+        let across = E::differ(numbers, source.numbers(to));
+        let means = source.pieces(numbers).means(from, to);
+        let (seen, alone) = shade(&means, eight(of.mm, k));
+        let (low, high) = self.seen[k * WIDE..(k + 1) * WIDE].split_at_mut(4);
+        E::put_rows(seen, low, high);
+        for half in 0..2 {
+            let which = across >> (4 * half) & 15;
+            if let Some(into) = self.across[self.count..].first_chunk_mut() {
+                put_from((k * WIDE + 4 * half) as u32, which, into);
+            }
+            self.count += which.count_ones() as usize;
         }
-        let [none, half] = [E::from_array([0.0; WIDE]), E::from_array([0.5; WIDE])];
-        let mm = E::from_array(*eight(of.mm, k, pad_mm));
-        let rise = E::from_array(rise);
-        // Between places of one bin, or all but one, the mean is that of the rates at them.
-        let bins = (E::from_array(last) - E::from_array(first)).abs();
-        let apart =
-            rise.abs().below(E::from_array([APART; WIDE]), none, bins.below(half, none, mm.over(rise)));
-        let near =
-            rise.abs().below(E::from_array([APART; WIDE]), mm * half, bins.below(half, mm * half, none));
-        self.apart.0[k] = apart.to_array();
-        self.near.0[k] = near.to_array();
+        alone & !across
     }
 
+    /// Integrates eight of those that are not within a piece.
     #[inline(always)]
-    fn add_up<E: Eight>(&mut self, bins: &Bins, k: usize) {
-        let [from, to] = [&self.from, &self.to];
-        let begin_parts = E::from_array(from.part.0[k]).spread();
-        let end_parts = E::from_array(to.part.0[k]).spread();
-        let apart = E::from_array(self.apart.0[k]).spread();
-        let near = E::from_array(self.near.0[k]).spread();
-        let of = |n: usize| {
-            [[n, n + 4].map(|n| bins.bin(from.bin.0[k][n])), [n, n + 4].map(|n| bins.bin(to.bin.0[k][n]))]
-        };
-        let two = [of(0), of(1), of(2), of(3)];
-        let a = Two::new(two[0], [begin_parts[0], end_parts[0]], [apart[0], near[0]]);
-        let b = Two::new(two[1], [begin_parts[1], end_parts[1]], [apart[1], near[1]]);
-        let c = Two::new(two[2], [begin_parts[2], end_parts[2]], [apart[2], near[2]]);
-        let d = Two::new(two[3], [begin_parts[3], end_parts[3]], [apart[3], near[3]]);
-        let mut ramps = [0; WIDE];
-        for n in 0..4 {
-            let [p, q] = two[n];
-            for half in 0..2 {
-                let [p, q] = [p[half].ramp, q[half].ramp];
-                ramps[n + 4 * half] = (p ^ q) | ((p | q) & MARKED);
+    fn across<E: Eight>(&mut self, source: &impl Source<E>, table: &Table, of: Stretches<'_>, k: usize) {
+        let which: [u32; WIDE] = std::array::from_fn(|n| self.across[k * WIDE + n]);
+        let pick = |of: &[f32]| E::from_array(which.map(|n| of.get(n as usize).copied().unwrap_or(0.0)));
+        let (from, to, mm) = (pick(of.from), pick(of.to), pick(of.mm));
+        let (first, last) = (source.numbers(from), source.numbers(to));
+        let (begin, end) = (source.pieces(first), source.pieces(last));
+        // Where they leave the one and enter the other.
+        let out = from.below(to, begin.end, begin.begin);
+        let into = from.below(to, end.begin, end.end);
+        let by = mm.over(to - from);
+        let (mut seen, mut alone) = shade(&begin.means(from, out), (out - from) * by);
+        let apart = into - out;
+        let none = E::all(0.0);
+        if none.bits_below(apart * by) != 0 {
+            let (between, rough) = between::<E>(table, first, last, apart * by);
+            under(&mut seen, between);
+            alone |= rough;
+        }
+        let (far, rough) = shade(&end.means(into, to), (to - into) * by);
+        under(&mut seen, far);
+        alone |= rough;
+        let mut rows = [[0.0; 4]; WIDE];
+        let (low, high) = rows.split_at_mut(4);
+        E::put_rows(seen, low, high);
+        for (row, &which) in rows.iter().zip(&which[..(self.count - k * WIDE).min(WIDE)]) {
+            self.seen[which as usize] = *row;
+        }
+        if alone != 0 {
+            let count = (self.count - k * WIDE).min(WIDE);
+            for n in (0..count).filter(|n| alone >> n & 1 == 1) {
+                self.alone(table, of, which[n] as usize);
             }
         }
-        self.sums[k] = Sums {
-            depth: [a.depth.to_array(), b.depth.to_array(), c.depth.to_array(), d.depth.to_array()],
-            turn: [a.turn.to_array(), b.turn.to_array(), c.turn.to_array(), d.turn.to_array()],
-            rise: E::lasts([a.rise, b.rise, c.rise, d.rise]).to_array(),
-            ramps,
-        };
     }
 
-    /// From optical depth to what is seen; tells which have to be seen to by themselves.
-    #[inline(always)]
-    fn shade<E: Eight>(&mut self, mm: &[f32; WIDE], k: usize) -> [u32; WIDE] {
-        let sums = &self.sums[k];
-        let [a, b, c, d] = sums.depth;
-        let depth = [E::from_array(a), E::from_array(b), E::from_array(c), E::from_array(d)];
-        let [a, b, c, d] = sums.turn;
-        let turn = [E::from_array(a), E::from_array(b), E::from_array(c), E::from_array(d)];
-        let tau = E::lasts(depth).to_array();
-        let varies = E::lasts(turn).to_array();
-        let (mut parts, mut lags, mut alone) = ([0.0; WIDE], [0.0; WIDE], [0; WIDE]);
-        for n in 0..WIDE {
-            let t = tau[n];
-            let opacity = opacity(t);
-            let varies = varies[n].abs();
-            let uneven = t * varies > EVEN_COLOR;
-            let rough = sums.rise[n].abs() * mm[n] * varies > EVEN_DEPTH;
-            let ramps = sums.ramps[n];
-            // What is marked or no number, or changes too much, is seen to by itself.
-            let much = if rough { 1 } else { ramps };
-            let marked = if t.is_nan() { 1 } else { ramps & MARKED };
-            alone[n] = if uneven { much } else { marked };
-            let is_seen = t > 0.0;
-            let (part, lag) = (opacity / t, behind(t, opacity));
-            parts[n] = if is_seen { part } else { 0.0 };
-            lags[n] = if is_seen { lag } else { 0.0 };
-        }
-        let parts = E::from_array(parts).spread();
-        let lags = E::from_array(lags).spread();
-        let (low, high) = self.seen[k * WIDE..(k + 1) * WIDE].split_at_mut(4);
-        for n in 0..4 {
-            let seen = depth[n] * parts[n] + turn[n].without_lasts() * lags[n];
-            seen.put(&mut low[n], &mut high[n]);
-        }
-        alone
+    /// Sees to one by itself.
+    #[cold]
+    #[inline(never)]
+    fn alone(&mut self, table: &Table, of: Stretches<'_>, n: usize) {
+        let [from, to] = [of.from[n], of.to[n]].map(|position| table.at(position, &Place::NOWHERE));
+        self.seen[n] = table.segment(&from, &to, of.mm[n]);
     }
+
+    #[inline(always)]
+    fn all<E: Eight>(&mut self, source: &impl Source<E>, table: &Table, of: Stretches<'_>) {
+        self.count = 0;
+        let count = of.mm.len().min(BATCH);
+        for k in 0..count.div_ceil(WIDE) {
+            let alone = self.within::<E>(source, of, k);
+            if alone != 0 {
+                for n in (0..WIDE).filter(|n| alone >> n & 1 == 1) {
+                    if k * WIDE + n < count {
+                        self.alone(table, of, k * WIDE + n);
+                    }
+                }
+            }
+        }
+        self.across[self.count..self.count + WIDE].fill(0);
+        for k in 0..self.count.div_ceil(WIDE) {
+            self.across::<E>(source, table, of, k);
+        }
+    }
+}
+
+/// What is seen of whole pieces between others, and of which that does not say enough.
+#[inline(always)]
+fn between<E: Eight>(table: &Table, first: E::Numbers, last: E::Numbers, mm: E) -> ([E; 4], u32) {
+    let (first, last) = (E::numbers_to_array(first), E::numbers_to_array(last));
+    let mut rates = [[0.0; WIDE]; 4];
+    let mut varies = [0.0; WIDE];
+    for n in 0..WIDE {
+        let [low, high] = [first[n].min(last[n]), first[n].max(last[n])].map(|number| number as usize);
+        if low + 1 < high {
+            let whole = table.whole(low + 1, high);
+            for c in 0..4 {
+                rates[c][n] = whole[c];
+            }
+            varies[n] = table.varies(low + 1, high);
+        }
+    }
+    let [r, g, b, tau] = rates.map(E::from_array);
+    let none = E::all(0.0);
+    let (seen, _) = shade(&Means { rates: [r, g, b, tau], turn: [none; 3], rough: none }, mm);
+    let uneven = E::all(EVEN_COLOR).bits_below(tau * mm * E::from_array(varies));
+    (seen, uneven)
 }
 
 impl Table {
     /// As [`Self::segment`], of several; what is seen of them is in the batch then.
     #[inline(always)]
     pub(in super::super) fn segments<E: Eight>(&self, batch: &mut Batch, of: Stretches<'_>) {
-        let wide = of.mm.len().div_ceil(WIDE).min(BATCH / WIDE);
-        for k in 0..wide {
-            batch.look_up::<E>(&self.bins, of, k);
-        }
-        for k in 0..wide {
-            batch.add_up::<E>(&self.bins, k);
-        }
-        for k in 0..wide {
-            let alone = batch.shade::<E>(eight(of.mm, k, &mut [0.0; WIDE]), k);
-            if alone.iter().fold(0, |any, alone| any | alone) != 0 {
-                self.alone(batch, of, alone, k);
-            }
-        }
-    }
-
-    /// Sees to those by themselves that have to be.
-    #[inline(never)]
-    fn alone(&self, batch: &mut Batch, of: Stretches<'_>, alone: [u32; WIDE], k: usize) {
-        for (n, _) in alone.iter().enumerate().filter(|(_, alone)| **alone != 0) {
-            let each = k * WIDE + n;
-            // There may be nothing at the end of the last.
-            let (Some(&from), Some(&to), Some(&mm)) = (of.from.get(each), of.to.get(each), of.mm.get(each))
-            else {
-                return;
-            };
-            let from = self.find(from, self.bins.bin(batch.from.bin.0[k][n]).piece as usize);
-            let to = self.find(to, self.bins.bin(batch.to.bin.0[k][n]).piece as usize);
-            batch.seen[each] = self.segment(&from, &to, mm);
+        match self.lanes.few() {
+            Some(few) => batch.all::<E>(&few, self, of),
+            None => batch.all::<E>(&Many::new(self), self, of),
         }
     }
 }

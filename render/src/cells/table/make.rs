@@ -1,23 +1,28 @@
 //! From a transfer function to its table.
 
-use super::bins::{Bins, Exact};
-use super::{Node, Piece, Place, Table};
+use super::lanes::Lanes;
+use super::{Piece, Table};
 use crate::volume::Transfer;
 
-/// Nodes in a piece along which extinction changes.
-const NODES: usize = 256;
+/// By how much of it extinction may be off in a piece, which is looked at in so many places.
+const SAME: f64 = 3e-4;
+const TRIED: u32 = 16;
+/// Places for looking positions up, for each piece.
+const STEPS: usize = 8;
 
 /// What is known of a table while it is made.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Made {
     pieces: Vec<Piece>,
-    nodes: Vec<Node>,
     /// What the pieces so far hold.
     sum: [f64; 4],
-    /// Where each piece begins.
-    starts: Vec<f64>,
-    /// The number of the ramp that pieces are of.
-    ramp: u32,
+    /// Where the next begins.
+    begin: f32,
+}
+
+/// Single precision is all that positions have: control points between two of them are at the nearest.
+fn single(position: f64) -> f32 {
+    position as f32
 }
 
 impl Table {
@@ -28,11 +33,10 @@ impl Table {
         // A span past the largest number ends at the values that there are.
         let per_value = if span > 0.0 && (1.0 / span) > 0.0 { 1.0 / span } else { 1.0 };
         let position = |value: f64| (value - low.value) * per_value;
-        let mut made =
-            Made { pieces: Vec::new(), nodes: Vec::new(), sum: [0.0; 4], starts: Vec::new(), ramp: 0 };
+        let mut made = Made::default();
         let mut clear = Vec::new();
         let mut clear_from = (low.rgba[3] == 0.0).then_some(f64::NEG_INFINITY);
-        made.push(transfer, [f64::NEG_INFINITY, 0.0], [low.rgba; 2]);
+        made.push_even(transfer, f32::NEG_INFINITY, low.rgba);
         for pair in points.windows(2) {
             let [a, b] = [&pair[0], &pair[1]];
             if clear_from.is_some() && b.rgba[3] > 0.0 {
@@ -44,116 +48,145 @@ impl Table {
             }
             if a.value < b.value {
                 let ends = [a.value, b.value].map(position);
-                let mut begin = (ends[0], a.rgba);
-                made.ramp += 1;
-                for part in opaque_cuts([a.rgba[3], b.rgba[3]]).chain([1.0]) {
-                    let end = if part == 1.0 {
-                        (ends[1], b.rgba)
-                    } else {
-                        // A place that positions, which are of single precision, can tell.
-                        let at = f64::from((ends[0] + (ends[1] - ends[0]) * part) as f32).min(ends[1]);
-                        let part = (at - ends[0]) / (ends[1] - ends[0]);
-                        let mix = |c: usize| a.rgba[c] + (b.rgba[c] - a.rgba[c]) * part;
-                        (at, std::array::from_fn(mix))
-                    };
-                    if begin.0 < end.0 {
-                        made.push(transfer, [begin.0, end.0], [begin.1, end.1]);
+                let mut begin = a.rgba;
+                for part in cuts([a.rgba[3], b.rgba[3]]) {
+                    // A place that positions can tell.
+                    let at = single(ends[0] + (ends[1] - ends[0]) * part);
+                    let part = ((f64::from(at) - ends[0]) / (ends[1] - ends[0])).clamp(0.0, 1.0);
+                    let end = std::array::from_fn(|c| a.rgba[c] + (b.rgba[c] - a.rgba[c]) * part);
+                    if made.push(transfer, at, [begin, end]) {
                         begin = end;
                     }
                 }
+                made.push(transfer, single(ends[1]), [begin, b.rgba]);
             }
         }
         clear.extend(clear_from.map(|from| [from, f64::INFINITY]));
-        made.ramp += 1;
-        made.push(transfer, [position(high.value), f64::INFINITY], [high.rgba; 2]);
-        let Made { pieces, nodes, starts, .. } = made;
-        let bins = Bins::new(&Exact { pieces: &pieces, nodes: &nodes, starts: &starts });
-        let start = Place { position: f32::NAN, piece: 0, sum: [0.0; 4], varied: 0.0 };
-        Self { pieces, nodes, bins, first: low.value, per_value, clear, start }
+        made.push_even(transfer, made.begin, high.rgba);
+        let Made { mut pieces, .. } = made;
+        for number in 1..pieces.len() {
+            pieces[number - 1].end = pieces[number].begin;
+        }
+        let steps = (STEPS * pieces.len()).next_power_of_two();
+        let mut at = 0;
+        let first = (0..=steps).map(|step| {
+            // What rounds to a step may lie a little before it.
+            let from = step as f32 / steps as f32 * (1.0 - f32::EPSILON);
+            while pieces[at].end <= from {
+                at += 1;
+            }
+            at as u32
+        });
+        let steps = first.collect();
+        let lanes = Lanes::new(&pieces);
+        Self { pieces, steps, lanes, first: low.value, per_value, clear }
     }
 }
 
 impl Made {
-    /// Adds a piece between two positions.
-    fn push(&mut self, transfer: &Transfer, [a, b]: [f64; 2], ends: [[f64; 4]; 2]) {
-        let bounded = a.is_finite() && b.is_finite();
-        let changes = bounded && ends[0] != ends[1];
-        let count = if changes { NODES } else { 1 };
-        let origin = if a.is_finite() { a } else { b };
-        let width = if bounded { (b - a) / count as f64 } else { 1.0 };
-        let rgba = |part: f64| -> [f64; 4] {
-            std::array::from_fn(|c| ends[0][c] + (ends[1][c] - ends[0][c]) * part.clamp(0.0, 1.0))
-        };
-        let rate = |part: f64| {
-            let [r, g, b, a] = rgba(part);
-            let tau = transfer.extinction_of(a);
-            [r * tau, g * tau, b * tau, tau]
-        };
-        let first = self.nodes.len() as u32;
-        let mut steepest = 0.0_f64;
-        for node in 0..count {
-            let [from, to] = [node, node + 1].map(|n| n as f64 / count as f64);
-            let mean = if changes { mean(&rate, [from, to]) } else { rate(0.0) };
-            let begin = rate(from);
-            steepest = steepest.max(2.0 * (mean[3] - begin[3]).abs() / width);
-            self.nodes.push(Node {
-                sum: self.sum,
-                from: begin.map(|v| v as f32),
-                half_rise: std::array::from_fn(|c| (mean[c] - begin[c]) as f32),
-            });
-            if bounded {
-                self.sum = std::array::from_fn(|c| self.sum[c] + mean[c] * width);
-            }
+    /// Adds one along which nothing changes.
+    fn push_even(&mut self, transfer: &Transfer, begin: f32, rgba: [f64; 4]) {
+        let tau = transfer.extinction_of(rgba[3]);
+        self.add(Piece {
+            begin,
+            end: f32::INFINITY,
+            origin: self.begin,
+            scale: 0.0,
+            extinction: [tau as f32, 0.0, 0.0, 0.0],
+            color: color(rgba),
+            turn: [0.0; 3],
+            varies: 0.0,
+            varied: 0.0,
+            sum: self.sum,
+        });
+    }
+
+    /// Adds one up to a position, unless that is no way off.
+    fn push(&mut self, transfer: &Transfer, end: f32, [from, to]: [[f64; 4]; 2]) -> bool {
+        let width = end - self.begin;
+        if width.is_nan() || width <= 0.0 {
+            return false;
         }
-        let length = if bounded { b - a } else { 1.0 };
-        let slope = std::array::from_fn(|c| ((ends[1][c] - ends[0][c]) / length) as f32);
-        let most = |v: [f32; 3]| v.into_iter().fold(0.0, |most: f32, v| most.max(v.abs()));
-        let before = self.pieces.last();
-        let color: [f32; 3] = std::array::from_fn(|c| ends[0][c] as f32);
-        let varied = before.map_or(0.0, |p| {
-            let length = if p.from.is_finite() { origin as f32 - p.origin } else { 0.0 };
-            let jump = std::array::from_fn(|c| color[c] - (p.color[c] + p.slope[c] * length));
-            p.varied + p.varies * length + most(jump)
+        let turn: [f64; 4] = std::array::from_fn(|c| to[c] - from[c]);
+        let cubic = cubic(|part| transfer.extinction_of(from[3] + turn[3] * part));
+        let [a, b, c, d] = cubic;
+        // The mean of the cubic, and of its product with the way along it.
+        let mean = a + b / 2.0 + c / 3.0 + d / 4.0;
+        let slanted = a / 2.0 + b / 3.0 + c / 4.0 + d / 5.0;
+        let turns = color(turn);
+        self.add(Piece {
+            begin: self.begin,
+            end,
+            origin: self.begin,
+            scale: 1.0 / width,
+            extinction: cubic.map(|v| v as f32),
+            color: color(from),
+            turn: turns,
+            varies: turns.into_iter().fold(0.0, |most, v| most.max(v.abs())),
+            varied: 0.0,
+            sum: self.sum,
         });
-        self.starts.push(a);
-        self.pieces.push(Piece {
-            ramp: self.ramp,
-            from: a as f32,
-            origin: origin as f32,
-            scale: (1.0 / width) as f32,
-            width: width as f32,
-            first,
-            last: first + count as u32 - 1,
-            color,
-            slope,
-            varied,
-            varies: most(slope),
-            rough: steepest as f32 * most(slope),
-        });
+        for c in 0..4 {
+            let mean = if c < 3 { from[c] * mean + turn[c] * slanted } else { mean };
+            self.sum[c] += mean * f64::from(width);
+        }
+        self.begin = end;
+        true
+    }
+
+    fn add(&mut self, mut piece: Piece) {
+        if let Some(before) = self.pieces.last() {
+            let jumps = (0..3).map(|c| (piece.color[c] - (before.color[c] + before.turn[c])).abs());
+            piece.varied = before.varied + before.varies + jumps.fold(0.0, f32::max);
+        }
+        self.pieces.push(piece);
     }
 }
 
-/// Where opacity comes so near to 1 that its extinction grows without bound, a ramp is cut wherever what comes through has
-/// halved, and where opacity counts as no more: parts of the way, rising.
-fn opaque_cuts([from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
-    let halves = (3..20).map(|k| 1.0 - 0.5_f64.powi(k)).chain([Transfer::MAX_OPACITY]);
-    let mut parts: Vec<f64> =
-        halves.map(|a| (a - from) / (to - from)).filter(|p| *p > 0.0 && *p < 1.0).collect();
-    parts.sort_unstable_by(f64::total_cmp);
-    parts.into_iter()
+fn color([r, g, b, _]: [f64; 4]) -> [f32; 3] {
+    [r, g, b].map(|v| v as f32)
 }
 
-/// The mean of a rate over a part of a piece, by five nodes of Gauss and Legendre.
-fn mean(rate: &impl Fn(f64) -> [f64; 4], [from, to]: [f64; 2]) -> [f64; 4] {
-    let nodes = [
-        (-0.906_179_845_938_664, 0.118_463_442_528_094_54),
-        (-0.538_469_310_105_683_1, 0.239_314_335_249_683_23),
-        (0.0, 0.284_444_444_444_444_44),
-        (0.538_469_310_105_683_1, 0.239_314_335_249_683_23),
-        (0.906_179_845_938_664, 0.118_463_442_528_094_54),
-    ];
-    nodes.into_iter().fold([0.0; 4], |sum, (node, weight)| {
-        let at = rate(from + (to - from) * 0.5 * (node + 1.0));
-        std::array::from_fn(|c| sum[c] + weight * at[c])
+/// Where a ramp of opacity is cut, parts of the way, rising: such that a cubic is as good as the logarithm that extinction is
+/// of it, and where opacity counts as no more.
+fn cuts([from, to]: [f64; 2]) -> Vec<f64> {
+    let part_of = |opacity: f64| (opacity - from) / (to - from);
+    let cap = part_of(Transfer::MAX_OPACITY);
+    let mut parts: Vec<f64> = [cap].into_iter().filter(|part| *part > 0.0 && *part < 1.0).collect();
+    let mut left = vec![[from, to].map(|opacity| opacity.min(Transfer::MAX_OPACITY))];
+    while let Some([from, to]) = left.pop() {
+        if !is_cubic([from, to]) {
+            let middle = 1.0 - ((1.0 - from) * (1.0 - to)).sqrt();
+            parts.push(part_of(middle));
+            left.extend([[from, middle], [middle, to]]);
+        }
+    }
+    parts.sort_unstable_by(f64::total_cmp);
+    parts
+}
+
+/// Whether extinction between two opacities is all but a cubic.
+fn is_cubic([from, to]: [f64; 2]) -> bool {
+    let extinction = |part: f64| -(-(from + (to - from) * part)).ln_1p();
+    let [a, b, c, d] = cubic(extinction);
+    (1..2 * TRIED).step_by(2).all(|n| {
+        let part = f64::from(n) / f64::from(2 * TRIED);
+        let [is, should] = [a + part * (b + part * (c + part * d)), extinction(part)];
+        (is - should).abs() <= SAME * should
     })
+}
+
+/// The cubic that is what a function is at 0, at 1 and twice between (where Lobatto has them).
+fn cubic(of: impl Fn(f64) -> f64) -> [f64; 4] {
+    let near = 0.5 - 0.05_f64.sqrt();
+    let [a, b, c, d] = [0.0, near, 1.0 - near, 1.0].map(of);
+    // By the middle and half the difference of each pair, about the middle of the way; then about its begin.
+    let (outer, inner) = (f64::midpoint(a, d), f64::midpoint(b, c));
+    let (outer_rise, inner_rise) = (d - a, (c - b) / (1.0 - 2.0 * near));
+    let (far, nigh) = (0.25, 0.05);
+    let square = (outer - inner) / (far - nigh);
+    let cube = (outer_rise - inner_rise) / (far - nigh);
+    let slope = inner_rise - cube * nigh;
+    let h = -0.5;
+    [a, slope + h * (2.0 * square + h * 3.0 * cube), square + 3.0 * h * cube, cube]
 }

@@ -1,25 +1,29 @@
 //! What is seen of an optical depth.
 
-/// Optical depth below which a series is as good as the exponential.
-const THIN: f32 = 0.25;
+/// Optical depth below which series are as good as the exponential.
+pub(super) const THIN: f32 = 0.25;
 
 /// By how much the share of the colour at the end of a stretch falls behind that at its begin.
 #[inline(always)]
 pub(super) fn behind(tau: f32, opacity: f32) -> f32 {
-    if tau < 0.05 {
-        tau * tau * (tau * (1.0 / 24.0) - 1.0 / 12.0)
-    } else {
-        opacity / tau - 1.0 + 0.5 * opacity
-    }
+    if tau < THIN { thin(tau)[1] } else { opacity / tau - 1.0 + 0.5 * opacity }
 }
 
 /// 1 - e^-τ, without loss where τ is small.
 #[inline(always)]
 pub(in super::super) fn opacity(tau: f32) -> f32 {
-    let series = 1.0 - tau * (1.0 / 3.0 - tau * (1.0 / 12.0 - tau * (1.0 / 60.0 - tau * (1.0 / 360.0))));
-    let thin = tau - 0.5 * tau * tau * series;
-    let thick = 1.0 - exp_minus(tau);
-    if tau < THIN { thin } else { thick }
+    if tau < THIN { thin(tau)[2] } else { 1.0 - exp_minus(tau) }
+}
+
+/// Of a small τ of at least 0: opacity for one of τ, by how much colours fall [`behind`], and opacity.
+#[inline(always)]
+pub(super) fn thin(tau: f32) -> [f32; 3] {
+    let part = 1.0
+        - tau
+            * (1.0 / 2.0
+                - tau * (1.0 / 6.0 - tau * (1.0 / 24.0 - tau * (1.0 / 120.0 - tau * (1.0 / 720.0)))));
+    let lag = tau * tau * (tau * (1.0 / 24.0 - tau * (1.0 / 80.0 - tau * (1.0 / 360.0))) - 1.0 / 12.0);
+    [part, lag, tau * part]
 }
 
 /// e^-τ for τ ≥ 0, by arithmetic alone: several go at once.

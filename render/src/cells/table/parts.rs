@@ -1,77 +1,97 @@
-//! Segments along which it matters which colour is in front.
+//! What is seen of one segment, whatever it passes.
 
 use super::opacity::{behind, opacity};
-use super::{EVEN_DEPTH, Place, Table};
+use super::{Cut, EVEN_COLOR, EVEN_DEPTH, Mean, Piece, Place, Table};
 
 /// In how many parts a piece goes at most; such a one is opaque long before its end.
 const PARTS: f32 = 1024.0;
 /// What lets less through ends a segment.
 const DARK: f32 = 1e-6;
 
-impl Table {
-    /// The same as [`Self::segment`] where it matters which colour is in front.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn in_parts(&self, from: &Place, to: &Place, mm: f32) -> [f32; 4] {
-        let rises = to.position > from.position;
-        let per_position = mm / (to.position - from.position);
-        let mut got = [0.0_f32; 4];
-        let mut begin = *from;
-        while begin.piece != to.piece {
-            let next = if rises { begin.piece + 1 } else { begin.piece - 1 };
-            // What is summed up to where two pieces meet is at the first node of the upper one.
-            let upper = &self.pieces[begin.piece.max(next)];
-            let sum = self.nodes[upper.first as usize].sum;
-            let end = Place { position: upper.from, piece: begin.piece, sum, varied: 0.0 };
-            self.part(&begin, &end, per_position, &mut got);
-            if 1.0 - got[3] < DARK {
-                return got;
-            }
-            begin = Place { piece: next, ..end };
-        }
-        self.part(&begin, to, per_position, &mut got);
-        got
+/// Colour, premultiplied, and opacity.
+#[derive(Debug, Default)]
+struct Seen([f32; 4]);
+
+impl Seen {
+    fn is_dark(&self) -> bool {
+        1.0 - self.0[3] < DARK
     }
 
-    /// Adds what lies between two places of one piece.
-    fn part(&self, from: &Place, to: &Place, per_position: f32, got: &mut [f32; 4]) {
-        let piece = &self.pieces[from.piece];
-        let rise = to.position - from.position;
-        let mm = per_position * rise;
-        if piece.rough * mm * (rise * rise) <= EVEN_DEPTH {
-            self.even(from, to, mm, got);
+    /// Puts a stretch of even extinction under it.
+    fn put(&mut self, Mean { rates, turn, .. }: &Mean, mm: f32) {
+        let tau = rates[3] * mm;
+        // Neither is anything seen of what is no number.
+        if tau > 0.0 {
+            let opacity = opacity(tau);
+            let (part, behind) = (mm * opacity / tau, behind(tau, opacity));
+            let through = 1.0 - self.0[3];
+            for c in 0..3 {
+                self.0[c] += through * (rates[c] * part + turn[c] * behind);
+            }
+            self.0[3] += through * opacity;
+        }
+    }
+
+    /// The same of what lies between two positions of one piece.
+    fn put_piece(&mut self, piece: &Piece, [from, to]: [f32; 2], mm: f32) {
+        let mean = piece.mean(from, to);
+        let rough = mean.rise.abs() * mm * mean.varies;
+        if rough.is_nan() || rough <= EVEN_DEPTH {
+            self.put(&mean, mm);
             return;
         }
-        let change = (self.rate(piece, to.position)[3] - self.rate(piece, from.position)[3]).abs() * mm;
-        let rough = change * piece.varies * rise.abs() / EVEN_DEPTH;
-        let parts = rough.sqrt().ceil().clamp(1.0, PARTS);
-        let mut begin = *from;
-        for n in 1..parts as u32 {
-            let position = from.position + rise * (n as f32 / parts);
-            let end = Place { position, sum: self.sum(piece, position), ..*from };
-            self.even(&begin, &end, per_position * (position - begin.position), got);
-            if 1.0 - got[3] < DARK {
+        let parts = (rough / EVEN_DEPTH).sqrt().ceil().clamp(1.0, PARTS);
+        let by = mm / (to - from);
+        let mut begin = from;
+        for n in 1..=parts as u32 {
+            // Not each position is one that there is.
+            let end = from + (to - from) * (n as f32 / parts);
+            self.put(&piece.mean(begin, end), (end - begin) * by);
+            if self.is_dark() {
                 return;
             }
             begin = end;
         }
-        self.even(&begin, to, per_position * (to.position - begin.position), got);
+    }
+}
+
+impl Table {
+    /// Colour, premultiplied, and opacity of `mm` along which the scalar runs from one place to another.
+    #[inline]
+    pub(in super::super) fn segment(&self, from: &Place, to: &Place, mm: f32) -> [f32; 4] {
+        let mut seen = Seen::default();
+        let (begin, end) = (&self.pieces[from.piece], &self.pieces[to.piece]);
+        if from.piece == to.piece {
+            seen.put_piece(begin, [from.position, to.position], mm);
+            return seen.0;
+        }
+        let Cut { near, between, far, mm } = self.cut(from, to, mm);
+        seen.put_piece(begin, near, mm[0]);
+        if let Some(pieces) = between {
+            self.put_whole(&mut seen, pieces, from.piece < to.piece, mm[1]);
+        }
+        if !seen.is_dark() {
+            seen.put_piece(end, far, mm[2]);
+        }
+        seen.0
     }
 
-    /// Adds what lies between two places of one piece along which extinction hardly changes.
-    fn even(&self, from: &Place, to: &Place, mm: f32, got: &mut [f32; 4]) {
-        let depth = self.depth(from, to, mm);
-        let tau = depth[3];
-        if tau > 0.0 {
-            let opacity = opacity(tau);
-            let (part, behind) = (opacity / tau, behind(tau, opacity));
-            let through = 1.0 - got[3];
-            let turn = (to.position - from.position) * behind;
-            let slope = &self.pieces[from.piece].slope;
-            for c in 0..3 {
-                got[c] += through * (depth[c] * part + slope[c] * turn);
+    /// Puts whole pieces, from one up to but not with another, under what is seen.
+    fn put_whole(&self, seen: &mut Seen, [low, high]: [usize; 2], rises: bool, mm: f32) {
+        let rates = self.whole(low, high);
+        let varies = self.varies(low, high);
+        if rates[3] * mm * varies <= EVEN_COLOR {
+            seen.put(&Mean { rates, turn: [0.0; 3], rise: 0.0, varies }, mm);
+            return;
+        }
+        let by = mm / (self.pieces[high - 1].end - self.pieces[low].begin);
+        for number in 0..high - low {
+            let piece = &self.pieces[if rises { low + number } else { high - 1 - number }];
+            let ends = if rises { [piece.begin, piece.end] } else { [piece.end, piece.begin] };
+            seen.put_piece(piece, ends, (piece.end - piece.begin) * by);
+            if seen.is_dark() {
+                return;
             }
-            got[3] += through * opacity;
         }
     }
 }
