@@ -8,6 +8,7 @@
 use std::ops::Range;
 
 use super::blocks::{Near, in_view};
+use super::clusters::Grain;
 use super::project::{Gathered, Projector};
 use super::scan::{Raw, Rect};
 use super::stats::Counts;
@@ -236,7 +237,7 @@ impl super::CellRenderer {
         view: &View,
         options: &Options,
     ) -> Result<Vec<Among>, CellsError> {
-        let ready = self.prepare(items)?;
+        let ready = self.prepare(items, Grain::Fine)?;
         let placed = items.iter().zip(ready);
         Ok(placed.map(|(item, ready)| Among::new(Placed::new(ready, item, view, options))).collect())
     }

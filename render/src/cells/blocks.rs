@@ -15,7 +15,7 @@ use super::CellsError;
 use super::early;
 use super::fold::{Segment, composite};
 use super::in_view::{InView, Shown};
-use super::lists::Lists;
+use super::lists::Log;
 use super::project::{Cluster, Frame, Projector};
 use super::scan::Rect;
 use super::stats::Counts;
@@ -72,7 +72,7 @@ struct Desk<'a> {
     manner: Manner,
     near: &'a [Near],
     projector: Projector,
-    lists: Lists,
+    log: Log,
     /// What comes through all that is known of each pixel, and how deep that reaches; with early termination only.
     known: Vec<(f32, f64)>,
     list: Vec<Segment>,
@@ -86,7 +86,7 @@ impl<'a> Desk<'a> {
             manner,
             near,
             projector: Projector::default(),
-            lists: Lists::new(0),
+            log: Log::default(),
             known: Vec::new(),
             list: Vec::new(),
             counts: Counts { held: frame.clusters.held(), ..Counts::default() },
@@ -95,9 +95,9 @@ impl<'a> Desk<'a> {
 
     /// Draws a block, as long as `goes_on`, which is asked for each cluster.
     fn draw(&mut self, Block { rect, near }: &Block, goes_on: impl Fn() -> bool) -> Option<Vec<Row>> {
-        let Self { frame, manner, projector, lists, known, counts, .. } = self;
+        let Self { frame, manner, projector, log, known, counts, .. } = self;
         let early = manner.early.map(|early| early.threshold as f32);
-        lists.reset(rect.area());
+        log.reset(rect.area());
         let [width, height] = rect.size();
         let mut table = manner.early.map(|_| early::Table::new(rect, manner.side));
         known.clear();
@@ -107,7 +107,7 @@ impl<'a> Desk<'a> {
             counts.clusters += 1;
             let mut ended = Vec::new();
             projector.draw(frame, of.cluster(), rect, table.as_ref(), counts, |pixel, run| {
-                lists.add(pixel, run);
+                log.add(pixel, run);
                 if let (Some(threshold), Some((through, reach))) = (early, known.get_mut(pixel)) {
                     *through *= 1.0 - run.rgba[3];
                     *reach = reach.max(run.back);
@@ -126,6 +126,7 @@ impl<'a> Desk<'a> {
                 return None;
             }
         }
+        log.close();
         Some((0..height).map(|y| self.row(y * width, width)).collect())
     }
 
@@ -133,13 +134,10 @@ impl<'a> Desk<'a> {
     fn row(&mut self, first: usize, width: usize) -> Row {
         let mut row = Row::default();
         for pixel in first..first + width {
-            let color = composite(
-                &self.lists,
-                pixel,
-                &mut self.list,
-                self.manner.keep.then_some(&mut row),
-                &mut self.counts,
-            );
+            self.list.clear();
+            self.list.extend_from_slice(self.log.pixel(pixel));
+            let kept = self.manner.keep.then_some(&mut row);
+            let color = composite(&mut self.list, kept, &mut self.counts);
             row.colors.push(color);
         }
         row

@@ -14,11 +14,29 @@ use super::split;
 use crate::volume::cells::{CellGrid, CellKind, Place};
 use crate::volume::{Point, Vector};
 
-/// Tetrahedra in a cluster at most, in small grids and in large ones; more only where many have the same corners. Larger
-/// clusters make longer runs; smaller ones are shared out and hidden more evenly.
-const CLUSTER: [usize; 2] = [512, 1024];
-/// From so many clusters on a grid is large.
-const LARGE: usize = 128;
+/// Tetrahedra in a cluster of a small grid at most; more only where many have the same corners.
+const CLUSTER: usize = 512;
+/// Clusters that a grid has at least before they are larger.
+const CLUSTERS: usize = 128;
+
+/// What clusters are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Grain {
+    /// To be hidden by others before them, and to be shared out evenly.
+    Fine,
+    /// For long runs of cells.
+    Coarse,
+}
+
+impl Grain {
+    /// Tetrahedra in a cluster of a large grid at most.
+    fn most(self) -> usize {
+        match self {
+            Self::Fine => 1024,
+            Self::Coarse => 4096,
+        }
+    }
+}
 
 /// What was wrong with cells, by its count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -83,7 +101,7 @@ struct Part {
 }
 
 impl Clusters {
-    pub(super) fn new(grid: &CellGrid) -> Self {
+    pub(super) fn new(grid: &CellGrid, grain: Grain) -> Self {
         let mut faults = Faults::default();
         let mut parts = parts(grid, &mut faults);
         let mut clusters = Self {
@@ -103,7 +121,7 @@ impl Clusters {
                 begin = i;
             }
         }
-        let most = (groups.len() / LARGE).clamp(CLUSTER[0], CLUSTER[1]);
+        let most = (groups.len() / CLUSTERS).clamp(CLUSTER, grain.most());
         // Halves of halves, across the longest side, the lower one first.
         let mut open = vec![&mut groups[..]];
         while let Some(range) = open.pop() {

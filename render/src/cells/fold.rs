@@ -2,7 +2,6 @@
 
 use std::cmp::Ordering;
 
-use super::lists::Lists;
 use super::scan::Raw;
 use super::stats::Counts;
 use super::table::{Place, Table, opacity};
@@ -71,6 +70,12 @@ pub(super) fn under(seen: &mut [f32; 4], behind: [f32; 4]) {
 #[inline(always)]
 pub(super) fn sort(raws: &mut [Raw]) {
     sort_by(raws, is_before);
+}
+
+/// The same of segments, by [`Segment::order`].
+#[inline(always)]
+pub(super) fn put_in_order(segments: &mut [Segment]) {
+    sort_by(segments, |a, b| if a.front == b.front { a.order(b).is_lt() } else { a.front < b.front });
 }
 
 /// Puts a list in order, of which much is in order already.
@@ -176,22 +181,16 @@ pub(super) fn merge(segments: &[Segment], mut done: impl FnMut(Segment)) {
     done(run);
 }
 
-/// Composites what a pixel's list has; `kept` gets its runs. `list` is for reuse.
+/// Composites the segments of a pixel, those of the nearest clusters first; `kept` gets its runs.
 #[inline(always)]
 pub(super) fn composite(
-    lists: &Lists,
-    pixel: usize,
     list: &mut Vec<Segment>,
     mut kept: Option<&mut Row>,
     counts: &mut Counts,
 ) -> [f32; 4] {
-    list.clear();
-    list.extend(lists.pixel(pixel));
-    // The nearest clusters came first, and lists begin with what came last.
-    list.reverse();
     // What comes one behind the other is in order.
     if overlap(list) {
-        sort_by(list, |a, b| if a.front == b.front { a.order(b).is_lt() } else { a.front < b.front });
+        put_in_order(list);
         if overlap(list) {
             counts.overlapping_pixels += 1;
             add_up(list);

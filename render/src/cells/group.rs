@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Weak};
 
-use super::clusters::Pack;
+use super::clusters::{Clusters, Pack};
 use super::link::{Link, LinkError};
 use super::orders::{Drawing, Order};
 use super::serve::serve;
@@ -17,7 +17,6 @@ use super::stats::Counts;
 use super::worker::{Gathered, Start, Step, Worker};
 use super::{CellItem, CellPicture, CellRenderer, CellsError, MAX_WORKERS, Options, Ready, Scalar};
 use crate::scene::Camera;
-use crate::volume::CellGrid;
 
 /// About how many bytes of cells go into one letter.
 const PIECE: usize = 1 << 20;
@@ -39,7 +38,7 @@ pub struct Group<L: Link> {
 /// What the others have.
 #[derive(Debug)]
 struct Dealt {
-    grid: Weak<CellGrid>,
+    clusters: Weak<Clusters>,
     scalar: Option<(usize, Scalar)>,
     /// For each cluster the process that has it beside the first; 0 where none has.
     homes: Vec<u32>,
@@ -162,7 +161,7 @@ fn draw<L: Link>(
 
 impl Dealt {
     fn nothing() -> Self {
-        Self { grid: Weak::new(), scalar: None, homes: Vec::new() }
+        Self { clusters: Weak::new(), scalar: None, homes: Vec::new() }
     }
 
     /// Sends each process what it lacks of its clusters; what was sent.
@@ -182,13 +181,13 @@ impl Dealt {
             sent.cell_bytes += message.len() as u64;
             desk.order(to, message)
         };
-        if self.grid.as_ptr() != Arc::as_ptr(&item.grid) {
+        if self.clusters.as_ptr() != Arc::as_ptr(&ready.placed.clusters) {
             *self = Self { homes: vec![0; clusters.len()], ..Self::nothing() };
             let outlines = Order::Grid(clusters.outlines().to_vec()).to_bytes();
             for to in others.clone() {
                 send(desk, to, outlines.clone())?;
             }
-            self.grid = Arc::downgrade(&item.grid);
+            self.clusters = Arc::downgrade(&ready.placed.clusters);
         }
         let scalar = Some((item.step, item.scalar.clone()));
         let same = self.scalar == scalar;

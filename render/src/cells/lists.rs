@@ -23,13 +23,6 @@ impl Lists {
         Self { heads: vec![NONE; pixels], nodes: Vec::new(), scratch: Default::default() }
     }
 
-    /// Forgets all, for so many pixels.
-    pub(super) fn reset(&mut self, pixels: usize) {
-        self.heads.clear();
-        self.heads.resize(pixels, NONE);
-        self.nodes.clear();
-    }
-
     /// Adds a segment in no order.
     pub(super) fn add(&mut self, pixel: usize, segment: Segment) {
         self.nodes.push(Node { segment, next: self.heads[pixel] });
@@ -119,5 +112,54 @@ impl Lists {
     /// Forgets the segments of a pixel.
     pub(super) fn clear(&mut self, pixel: usize) {
         self.heads[pixel] = NONE;
+    }
+}
+
+/// Segments as they come, put together by pixel when all are there.
+#[derive(Debug, Default)]
+pub(super) struct Log {
+    pixels: Vec<u32>,
+    segments: Vec<Segment>,
+    /// How many each pixel has; then where those of the pixel end.
+    ends: Vec<u32>,
+    by_pixel: Vec<Segment>,
+}
+
+impl Log {
+    /// Forgets all, for so many pixels.
+    pub(super) fn reset(&mut self, pixels: usize) {
+        self.pixels.clear();
+        self.segments.clear();
+        self.ends.clear();
+        self.ends.resize(pixels, 0);
+    }
+
+    pub(super) fn add(&mut self, pixel: usize, segment: Segment) {
+        self.pixels.push(pixel as u32);
+        self.segments.push(segment);
+        self.ends[pixel] += 1;
+    }
+
+    /// Puts all together by pixel, in the order in which they came.
+    pub(super) fn close(&mut self) {
+        let mut begin = 0;
+        for end in &mut self.ends {
+            (*end, begin) = (begin, begin + *end);
+        }
+        if let Some(&any) = self.segments.first() {
+            // What there was before is written over.
+            self.by_pixel.resize(self.segments.len(), any);
+        }
+        for (&pixel, &segment) in self.pixels.iter().zip(&self.segments) {
+            let place = &mut self.ends[pixel as usize];
+            self.by_pixel[*place as usize] = segment;
+            *place += 1;
+        }
+    }
+
+    /// The segments of a pixel, when all are put together.
+    pub(super) fn pixel(&self, pixel: usize) -> &[Segment] {
+        let begin = if pixel == 0 { 0 } else { self.ends[pixel - 1] };
+        &self.by_pixel[begin as usize..self.ends[pixel] as usize]
     }
 }

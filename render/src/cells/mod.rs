@@ -80,7 +80,7 @@ use crate::scene::{Camera, CameraError, CellItem};
 use crate::simd::has_wide;
 use crate::view::View;
 use crate::volume::cells::{CellGrid, Scalar};
-use clusters::{Clusters, Scalars};
+use clusters::{Clusters, Grain, Scalars};
 use lens::Lens;
 use project::Frame;
 use table::Table;
@@ -211,6 +211,7 @@ impl Segments {
 #[derive(Debug)]
 struct Kept {
     grid: Weak<CellGrid>,
+    grain: Grain,
     clusters: Arc<Clusters>,
     /// Of steps: what was drawn last.
     scalars: Vec<(usize, Scalar, Arc<Scalars>)>,
@@ -278,7 +279,8 @@ impl CellRenderer {
             return Err(CellsError::Early);
         }
         let view = View::new(camera, size)?;
-        let prepared = self.prepare(std::slice::from_ref(item))?;
+        let grain = if options.early.is_some() { Grain::Fine } else { Grain::Coarse };
+        let prepared = self.prepare(std::slice::from_ref(item), grain)?;
         let Some(prepared) = prepared.into_iter().next() else { return Err(CellsError::Workers) };
         let prepare_ms = begin.elapsed().as_secs_f64() * 1e3;
         let begin = Instant::now();
@@ -286,7 +288,7 @@ impl CellRenderer {
     }
 
     /// Makes ready what is not of grids and their scalars, and lets go of scalars that are not asked for.
-    fn prepare(&mut self, items: &[CellItem]) -> Result<Vec<Prepared>, CellsError> {
+    fn prepare(&mut self, items: &[CellItem], grain: Grain) -> Result<Vec<Prepared>, CellsError> {
         self.kept.retain(|kept| kept.grid.strong_count() > 0);
         let is_of = |item: &CellItem, grid: &Weak<CellGrid>| grid.as_ptr() == Arc::as_ptr(&item.grid);
         for Kept { grid, scalars, .. } in &mut self.kept {
@@ -300,9 +302,11 @@ impl CellRenderer {
             let step = steps.get(item.step).ok_or(missing)?;
             let missing = || CellsError::Field { name: item.scalar.name.clone() };
             let field = item.scalar.field(step).ok_or_else(missing)?;
-            let index = self.kept.iter().position(|kept| is_of(item, &kept.grid)).unwrap_or_else(|| {
-                let (grid, clusters) = (Arc::downgrade(&item.grid), Arc::new(Clusters::new(&item.grid)));
-                self.kept.push(Kept { grid, clusters, scalars: Vec::new() });
+            let is_kept = |kept: &Kept| kept.grain == grain && is_of(item, &kept.grid);
+            let index = self.kept.iter().position(is_kept).unwrap_or_else(|| {
+                let grid = Arc::downgrade(&item.grid);
+                let clusters = Arc::new(Clusters::new(&item.grid, grain));
+                self.kept.push(Kept { grid, grain, clusters, scalars: Vec::new() });
                 self.kept.len() - 1
             });
             let Kept { clusters, scalars, .. } = &mut self.kept[index];

@@ -2,7 +2,7 @@
 
 use super::clusters::{Clusters, Scalars};
 use super::early;
-use super::fold::{Segment, add_up, integrate, length, merge, overlap, sort};
+use super::fold::{Segment, add_up, integrate, length, merge, overlap, put_in_order, sort};
 use super::in_view::{InView, Shown};
 use super::lens::Lens;
 use super::runs::{MIXED, NONE, Open, Run, go_on};
@@ -339,7 +339,7 @@ impl Projector {
                     self.spans.push(run);
                     *last = before;
                 }
-                self.spans.sort_unstable_by(Segment::order);
+                put_in_order(&mut self.spans);
                 if overlap(&self.spans) {
                     (*last, mixed) = (MIXED, true);
                 } else {

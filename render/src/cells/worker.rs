@@ -482,7 +482,11 @@ impl<'a, L: Link> Worker<'a, L> {
         let counts = &mut self.gathered.counts[rank];
         for pixel in y * width..(y + 1) * width {
             let kept = self.manner.keep.then_some(&mut row);
-            let color = composite(&self.lists, pixel, &mut list, kept, counts);
+            list.clear();
+            list.extend(self.lists.pixel(pixel));
+            // The nearest clusters came first, and lists begin with what came last.
+            list.reverse();
+            let color = composite(&mut list, kept, counts);
             row.colors.push(color);
         }
         row
