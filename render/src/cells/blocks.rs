@@ -14,12 +14,12 @@ use rayon::prelude::*;
 use super::CellsError;
 use super::early;
 use super::fold::{Segment, composite};
-use super::in_view::{InView, Shown};
+use super::in_view::{Chosen, InView};
 use super::lists::Log;
 use super::project::{Cluster, Frame, Projector};
 use super::scan::Rect;
 use super::stats::Counts;
-use super::worker::{Gathered, Manner, Row};
+use super::worker::{Gathered, Kept, Manner};
 
 /// Pixels that a block is wide and high: at most, and where the picture is too small for [`EACH`] at least.
 const BLOCK: [usize; 2] = [64, 8];
@@ -52,7 +52,7 @@ pub(super) fn in_view(frame: &Frame<'_>) -> (Vec<Near>, Counts) {
         }
     }
     shown.sort_unstable_by_key(|&(nearest, cluster, _)| (nearest, cluster));
-    let fill = |scratch: &mut Vec<Shown>, &(_, cluster, reach): &(u64, usize, Rect)| {
+    let fill = |scratch: &mut Vec<Chosen>, &(_, cluster, reach): &(u64, usize, Rect)| {
         let (mut view, mut counts) = (InView::default(), Counts::default());
         view.fill(frame, cluster, scratch, &mut counts);
         (Near { cluster, reach, view }, counts)
@@ -93,12 +93,18 @@ impl<'a> Desk<'a> {
         }
     }
 
-    /// Draws a block, as long as `goes_on`, which is asked for each cluster.
-    fn draw(&mut self, Block { rect, near }: &Block, goes_on: impl Fn() -> bool) -> Option<Vec<Row>> {
+    /// Draws a block into its rows of the picture, as long as `goes_on`, which is asked for each cluster. What is kept of
+    /// each row.
+    fn draw(
+        &mut self,
+        Block { rect, near }: &Block,
+        rows: &mut [&mut [[f32; 4]]],
+        goes_on: impl Fn() -> bool,
+    ) -> Option<Vec<Kept>> {
         let Self { frame, manner, projector, log, known, counts, .. } = self;
         let early = manner.early.map(|early| early.threshold as f32);
         log.reset(rect.area());
-        let [width, height] = rect.size();
+        let [width, _] = rect.size();
         let mut table = manner.early.map(|_| early::Table::new(rect, manner.side));
         known.clear();
         known.resize(if early.is_some() { rect.area() } else { 0 }, (1.0, 0.0));
@@ -127,20 +133,19 @@ impl<'a> Desk<'a> {
             }
         }
         log.close();
-        Some((0..height).map(|y| self.row(y * width, width)).collect())
+        Some(rows.iter_mut().enumerate().map(|(y, row)| self.composite(y * width, row)).collect())
     }
 
     /// Composites the pixels of a row of a block, which begins with `first`.
-    fn row(&mut self, first: usize, width: usize) -> Row {
-        let mut row = Row::default();
-        for pixel in first..first + width {
+    fn composite(&mut self, first: usize, row: &mut [[f32; 4]]) -> Kept {
+        let mut kept = Kept::default();
+        for (pixel, color) in (first..).zip(row) {
             self.list.clear();
             self.list.extend_from_slice(self.log.pixel(pixel));
-            let kept = self.manner.keep.then_some(&mut row);
-            let color = composite(&mut self.list, kept, &mut self.counts);
-            row.colors.push(color);
+            let kept = self.manner.keep.then_some(&mut kept);
+            *color = composite(&mut self.list, kept, &mut self.counts);
         }
-        row
+        kept
     }
 }
 
@@ -186,10 +191,10 @@ impl Blocks {
     }
 }
 
-/// What threads have drawn: rows of blocks, with the blocks' numbers; and what each of them did.
+/// What threads have kept of rows of blocks, with the blocks' numbers; and what each of them did.
 #[derive(Default)]
 struct Drawn {
-    rows: Vec<(usize, Vec<Row>)>,
+    kept: Vec<(usize, Vec<Kept>)>,
     counts: Vec<Counts>,
 }
 
@@ -214,16 +219,26 @@ pub(super) fn run(
         }
         !cancelled.load(Ordering::Relaxed)
     };
+    let [width, height] = frame.size.map(|n| n as usize);
+    let mut pixels = vec![[0.0; 4]; width * height];
+    let mut rows: Vec<Vec<&mut [[f32; 4]]>> = blocks.iter().map(|_| Vec::with_capacity(side)).collect();
+    for (y, row) in pixels.chunks_mut(width).enumerate() {
+        for (block, part) in (y / side * across..).zip(row.chunks_mut(side)) {
+            rows[block].push(part);
+        }
+    }
+    let rows: Vec<_> = rows.into_iter().map(Mutex::new).collect();
     let drawn = Mutex::new(Drawn::default());
     let work = || {
         let mut desk = Desk::new(frame, manner, &near);
         let mut mine = Vec::new();
         while let Some(&block) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let Some(rows) = desk.draw(&blocks[block], goes_on) else { return };
-            mine.push((block, rows));
+            let mut rows = rows[block].lock().unwrap_or_else(PoisonError::into_inner);
+            let Some(kept) = desk.draw(&blocks[block], &mut rows, goes_on) else { return };
+            mine.push((block, kept));
         }
         let mut drawn = drawn.lock().unwrap_or_else(PoisonError::into_inner);
-        drawn.rows.append(&mut mine);
+        drawn.kept.append(&mut mine);
         drawn.counts.push(desk.counts);
     };
     rayon::scope(|scope| {
@@ -234,17 +249,18 @@ pub(super) fn run(
     if cancelled.into_inner() {
         return Err(CellsError::Cancelled);
     }
-    let Drawn { rows: mut drawn, mut counts } = drawn.into_inner().unwrap_or_else(PoisonError::into_inner);
+    drop(rows);
+    let Drawn { kept: mut drawn, mut counts } = drawn.into_inner().unwrap_or_else(PoisonError::into_inner);
     // Then blocks that stand side by side come one behind the other.
     drawn.sort_unstable_by_key(|&(block, _)| block);
-    let mut rows = vec![Row::default(); frame.size[1] as usize];
+    let mut kept = vec![Kept::default(); height];
     for (block, part) in drawn {
-        for (row, more) in rows[block / across * side..].iter_mut().zip(part) {
+        for (row, more) in kept[block / across * side..].iter_mut().zip(part) {
             row.append(more);
         }
     }
     if let Some(first) = counts.first_mut() {
         first.add(skipped);
     }
-    Ok(Gathered { rows, counts })
+    Ok(Gathered { pixels, kept, counts })
 }

@@ -16,12 +16,13 @@ const STEPS: usize = 1024;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shown {
     pub(super) tetrahedron: u32,
+    /// Depth of its nearest corner, or a little less.
+    pub(super) nearest: f32,
     pub(super) reach: Rect,
-    /// Depth of its nearest corner.
-    pub(super) nearest: f64,
-    /// Depths of all corners, added.
-    depth: f64,
 }
+
+/// One with the depths of its corners, added.
+pub(super) type Chosen = (Shown, f64);
 
 /// What of a cluster is before the camera.
 #[derive(Debug, Default)]
@@ -38,7 +39,7 @@ impl InView {
         &mut self,
         frame: &Frame<'_>,
         cluster: usize,
-        scratch: &mut Vec<Shown>,
+        scratch: &mut Vec<Chosen>,
         counts: &mut Counts,
     ) {
         if !frame.wide {
@@ -52,7 +53,7 @@ impl InView {
                 view: &mut InView,
                 frame: &Frame<'_>,
                 cluster: usize,
-                scratch: &mut Vec<Shown>,
+                scratch: &mut Vec<Chosen>,
                 counts: &mut Counts,
             ) {
                 view.fill_by::<WideFour>(frame, cluster, scratch, counts);
@@ -70,7 +71,7 @@ impl InView {
         &mut self,
         frame: &Frame<'_>,
         cluster: usize,
-        scratch: &mut Vec<Shown>,
+        scratch: &mut Vec<Chosen>,
         counts: &mut Counts,
     ) {
         let of_points = frame.scalars.place() == Place::Points;
@@ -95,7 +96,7 @@ impl InView {
         &self,
         frame: &Frame<'_>,
         cluster: usize,
-        chosen: &mut Vec<Shown>,
+        chosen: &mut Vec<Chosen>,
         counts: &mut Counts,
     ) {
         chosen.clear();
@@ -128,33 +129,34 @@ impl InView {
                 counts.outside += 1;
                 continue;
             }
-            chosen.push(Shown { tetrahedron: index as u32, reach, nearest, depth });
+            let nearest = (nearest as f32).next_down();
+            chosen.push((Shown { tetrahedron: index as u32, nearest, reach }, depth));
         }
     }
 
     /// Puts what is chosen roughly in order of depth: most stretches then go on where the one before ended.
     #[inline(always)]
-    fn put_in_order(&mut self, chosen: &[Shown]) {
+    fn put_in_order(&mut self, chosen: &[Chosen]) {
         self.cells.clear();
-        let Some(&any) = chosen.first() else { return };
+        let Some(&(any, _)) = chosen.first() else { return };
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for shown in chosen {
-            (low, high) = (low.min(shown.depth), high.max(shown.depth));
+        for &(_, depth) in chosen {
+            (low, high) = (low.min(depth), high.max(depth));
         }
         let scale = if high > low { STEPS as f64 / (high - low) } else { 0.0 };
-        let step = |shown: &Shown| (((shown.depth - low) * scale) as usize).min(STEPS - 1);
+        let step = |depth: f64| (((depth - low) * scale) as usize).min(STEPS - 1);
         let mut begins = [0_u32; STEPS];
-        for shown in chosen {
-            begins[step(shown)] += 1;
+        for &(_, depth) in chosen {
+            begins[step(depth)] += 1;
         }
         let mut begin = 0;
         for count in &mut begins {
             (*count, begin) = (begin, begin + *count);
         }
         self.cells.resize(chosen.len(), any);
-        for shown in chosen {
-            let place = &mut begins[step(shown)];
-            self.cells[*place as usize] = *shown;
+        for &(shown, depth) in chosen {
+            let place = &mut begins[step(depth)];
+            self.cells[*place as usize] = shown;
             *place += 1;
         }
     }

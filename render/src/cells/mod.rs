@@ -404,10 +404,9 @@ impl Ready {
 
     fn picture(&self, gathered: Gathered, options: &Options) -> CellPicture {
         let [width, height] = self.placed.size;
-        let mut image = FloatImage { width, height, pixels: Vec::new() };
+        let image = FloatImage { width, height, pixels: gathered.pixels };
         let mut segments = Segments { width, starts: vec![0], list: Vec::new() };
-        for row in gathered.rows {
-            image.pixels.extend(row.colors);
+        for row in gathered.kept {
             for count in row.counts {
                 let last = segments.starts[segments.starts.len() - 1];
                 segments.starts.push(last + count as usize);

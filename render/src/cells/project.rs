@@ -186,7 +186,7 @@ impl Projector {
             if mine.is_empty() {
                 continue;
             }
-            if early.is_some_and(|table| table.hides(&mine, shown.nearest)) {
+            if early.is_some_and(|table| table.hides(&mine, f64::from(shown.nearest))) {
                 counts.hidden += 1;
                 continue;
             }
@@ -319,10 +319,11 @@ impl Projector {
         let rows = open.runs.chunks_exact(across).zip(open.last.chunks_exact_mut(across));
         for (y, (runs, lasts)) in (tile.low[1]..).zip(rows) {
             let first = rect.number([tile.low[0], y]);
-            for (x, (Run(run), last)) in runs.iter().zip(lasts).enumerate() {
-                if run.back < 0.0 {
+            for (x, (run, last)) in runs.iter().zip(lasts).enumerate() {
+                if run.is_none() {
                     continue;
                 }
+                let Run(run) = run;
                 let mut done = |run: Segment| {
                     if run.rgba[3] > 0.0 {
                         counts.runs += 1;

@@ -28,8 +28,14 @@ pub(super) struct Open {
 pub(super) struct Run(pub(super) Segment);
 
 impl Run {
-    /// Where there is none: nothing, that ends before all and begins after.
-    const NONE: Self = Self(Segment { front: f64::INFINITY, back: -1.0, rgba: [0.0; 4] });
+    /// Where there is none: nothing, that begins after all and ends at no depth.
+    const NONE: Self = Self(Segment { front: f64::INFINITY, back: f64::NAN, rgba: [0.0; 4] });
+
+    /// Whether there is none.
+    #[inline(always)]
+    pub(super) fn is_none(&self) -> bool {
+        self.0.back.is_nan()
+    }
 }
 
 impl Open {
@@ -74,6 +80,7 @@ pub(super) fn go_on(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open:
 }
 
 #[inline(always)]
+#[expect(clippy::double_comparisons, reason = "a depth that is no number is neither less nor more, but not the same")]
 fn go_on_by<E: Eight>(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
     let mut mm = [0.0; BATCH];
     for first in (0..raws.len()).step_by(BATCH) {
@@ -90,11 +97,13 @@ fn go_on_by<E: Eight>(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, ope
             }
         }
         frame.table.segments::<E>(batch, Stretches { from: raws.from, to: raws.to, mm });
-        for (n, (&pixel, &rgba)) in raws.pixels.iter().zip(batch.seen()).enumerate() {
-            let Run(run) = &mut open.runs[pixel as usize];
-            let [front, back] = [raws.fronts[n], raws.backs[n]];
-            // A run begins with nothing, as it goes on.
-            if front == run.back || run.back < 0.0 {
+        let depths = raws.fronts.iter().zip(raws.backs);
+        let Open { runs, last, aside, .. } = &mut *open;
+        let runs = &mut runs[..];
+        for ((&pixel, &rgba), (&front, &back)) in raws.pixels.iter().zip(batch.seen()).zip(depths) {
+            let Run(run) = &mut runs[pixel as usize];
+            // It ends where this begins, or there is none: one question, since which of the two cannot be foreseen.
+            if !(front < run.back || front > run.back) {
                 run.front = if front < run.front { front } else { run.front };
                 run.back = back;
                 under(&mut run.rgba, rgba);
@@ -105,9 +114,9 @@ fn go_on_by<E: Eight>(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, ope
                 under(&mut new.rgba, run.rgba);
                 new.back = run.back;
             } else {
-                let last = &mut open.last[pixel as usize];
-                open.aside.push((*run, *last));
-                *last = (open.aside.len() - 1) as u32;
+                let last = &mut last[pixel as usize];
+                aside.push((*run, *last));
+                *last = (aside.len() - 1) as u32;
             }
             *run = new;
         }

@@ -14,7 +14,7 @@
 use super::clusters::Pack;
 use super::early::{self, Early};
 use super::fold::{Segment, composite};
-use super::in_view::{InView, Shown};
+use super::in_view::{Chosen, InView};
 use super::link::{Link, LinkError};
 use super::lists::Lists;
 use super::project::{Cluster, Frame, Projector};
@@ -63,11 +63,10 @@ enum Phase {
     Done,
 }
 
-/// A finished row.
+/// What is kept of the segments of pixels side by side.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Row {
-    pub(super) colors: Vec<[f32; 4]>,
-    /// How many segments each pixel has; empty where they are not kept.
+pub(super) struct Kept {
+    /// How many each pixel has; empty where they are not kept.
     pub(super) counts: Vec<u32>,
     pub(super) segments: Vec<Segment>,
 }
@@ -75,7 +74,10 @@ pub(super) struct Row {
 /// What the first worker has in the end.
 #[derive(Debug)]
 pub(super) struct Gathered {
-    pub(super) rows: Vec<Row>,
+    /// Colours, row by row.
+    pub(super) pixels: Vec<[f32; 4]>,
+    /// Segments of each row.
+    pub(super) kept: Vec<Kept>,
     /// What each worker did.
     pub(super) counts: Vec<Counts>,
 }
@@ -92,7 +94,7 @@ pub(super) struct Worker<'a, L> {
     table: Option<early::Table>,
     projector: Projector,
     view: InView,
-    scratch: Vec<Shown>,
+    scratch: Vec<Chosen>,
     /// Runs of a cluster, which with early termination cannot be taken while it is drawn.
     runs: Vec<(usize, Segment)>,
     phase: Phase,
@@ -110,12 +112,11 @@ pub(super) struct Worker<'a, L> {
     gathered: Gathered,
 }
 
-impl Row {
-    /// Adds what stands to the right of it.
-    pub(super) fn append(&mut self, more: Self) {
-        self.colors.extend(more.colors);
-        self.counts.extend(more.counts);
-        self.segments.extend(more.segments);
+impl Kept {
+    /// Puts more pixels behind it.
+    pub(super) fn append(&mut self, mut more: Self) {
+        self.counts.append(&mut more.counts);
+        self.segments.append(&mut more.segments);
     }
 }
 
@@ -125,7 +126,8 @@ impl<'a, L: Link> Worker<'a, L> {
         let [width, height] = frame.size.map(|n| n as usize);
         let workers = link.size();
         queue.reverse();
-        let rows = if link.rank() == 0 { vec![Row::default(); height] } else { Vec::new() };
+        let first = usize::from(link.rank() == 0);
+        let (pixels, kept) = (vec![[0.0; 4]; first * width * height], vec![Kept::default(); first * height]);
         Self {
             frame,
             manner,
@@ -145,7 +147,7 @@ impl<'a, L: Link> Worker<'a, L> {
             asked: false,
             came: 0,
             ended: 0,
-            gathered: Gathered { rows, counts: vec![Counts::default(); workers] },
+            gathered: Gathered { pixels, kept, counts: vec![Counts::default(); workers] },
             link,
         }
     }
@@ -276,8 +278,10 @@ impl<'a, L: Link> Worker<'a, L> {
                 let counted = if self.manner.keep { width } else { 0 };
                 let sum: u64 = counts.iter().map(|&count| u64::from(count)).sum();
                 let whole = colors.len() == width && counts.len() == counted && sum == segments.len() as u64;
-                let row = self.gathered.rows.get_mut(row as usize).filter(|_| whole).ok_or(nonsense)?;
-                *row = Row { colors, counts, segments };
+                if !whole || row >= self.frame.size[1] {
+                    return Err(nonsense);
+                }
+                self.put(row as usize, &colors, Kept { counts, segments });
             }
             Message::Counts(list) => {
                 self.gathered.counts[from] = Counts::from_list(&list).ok_or(nonsense)?;
@@ -440,11 +444,11 @@ impl<'a, L: Link> Worker<'a, L> {
             return Ok(Step::Worked);
         }
         for y in (0..height).filter(|&y| band(y as usize) == me) {
-            let row = self.row(y as usize);
+            let (colors, kept) = self.row(y as usize);
             if me == 0 {
-                self.gathered.rows[y as usize] = row;
+                self.put(y as usize, &colors, kept);
             } else {
-                self.send(0, &Message::Row(y, row.colors, row.counts, row.segments))?;
+                self.send(0, &Message::Row(y, colors, kept.counts, kept.segments))?;
             }
         }
         self.phase = Phase::Gathering;
@@ -473,10 +477,16 @@ impl<'a, L: Link> Worker<'a, L> {
         taken
     }
 
+    /// Puts a finished row into the picture, which the first worker has.
+    fn put(&mut self, y: usize, colors: &[[f32; 4]], kept: Kept) {
+        self.gathered.pixels[y * colors.len()..][..colors.len()].copy_from_slice(colors);
+        self.gathered.kept[y] = kept;
+    }
+
     /// Composites a row.
-    fn row(&mut self, y: usize) -> Row {
+    fn row(&mut self, y: usize) -> (Vec<[f32; 4]>, Kept) {
         let width = self.frame.size[0] as usize;
-        let mut row = Row::default();
+        let (mut colors, mut row) = (Vec::with_capacity(width), Kept::default());
         let mut list: Vec<Segment> = Vec::new();
         let rank = self.link.rank();
         let counts = &mut self.gathered.counts[rank];
@@ -486,9 +496,8 @@ impl<'a, L: Link> Worker<'a, L> {
             list.extend(self.lists.pixel(pixel));
             // The nearest clusters came first, and lists begin with what came last.
             list.reverse();
-            let color = composite(&mut list, kept, counts);
-            row.colors.push(color);
+            colors.push(composite(&mut list, kept, counts));
         }
-        row
+        (colors, row)
     }
 }

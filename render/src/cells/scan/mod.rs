@@ -114,7 +114,7 @@ pub(super) struct Raw {
 const FACES: [([usize; 3], [usize; 3]); 4] =
     [([1, 2, 3], [5, 4, 3]), ([0, 2, 3], [5, 2, 1]), ([0, 1, 3], [4, 2, 0]), ([0, 1, 2], [3, 1, 0])];
 /// What is gathered before it is handed on.
-const GATHERED: usize = 256;
+const GATHERED: usize = 512;
 
 /// What rays have of cells, gathered until there is enough of it: a [`Raw`] each, part by part.
 #[derive(Debug)]

@@ -8,7 +8,7 @@ use crate::simd::{Eight, put_from};
 /// Numbers that go through arithmetic together.
 const WIDE: usize = 8;
 /// Segments that go at once.
-pub(in super::super) const BATCH: usize = 88;
+pub(in super::super) const BATCH: usize = 520;
 
 /// Several segments, and what is seen of them.
 #[derive(Debug)]
