@@ -179,22 +179,26 @@ impl Projector {
         counts: &mut Counts,
         done: &mut impl FnMut(usize, Segment),
     ) {
-        self.shown.clear();
+        let cells = &of.view.cells;
+        if let Some(&any) = cells.first() {
+            self.shown.resize(cells.len(), any);
+        }
+        // Each is written, and kept if it is here after all: which are cannot be foreseen.
+        let mut kept = 0;
+        for shown in cells {
+            let reach = shown.reach.meet(rect);
+            self.shown[kept] = Shown { reach, ..*shown };
+            kept += usize::from(!reach.is_empty());
+        }
+        self.shown.truncate(kept);
+        if let Some(table) = early {
+            self.shown.retain(|shown| !table.hides(&shown.reach, f64::from(shown.nearest)));
+        }
+        counts.hidden += (kept - self.shown.len()) as u64;
+        counts.scanned += self.shown.len() as u64;
         let mut reach = Rect { low: rect.high, high: rect.low };
-        for shown in &of.view.cells {
-            let mine = shown.reach.meet(rect);
-            if mine.is_empty() {
-                continue;
-            }
-            if early.is_some_and(|table| table.hides(&mine, f64::from(shown.nearest))) {
-                counts.hidden += 1;
-                continue;
-            }
-            counts.scanned += 1;
-            reach = reach.join(&mine);
-            let mut shown = *shown;
-            shown.reach = mine;
-            self.shown.push(shown);
+        for shown in &self.shown {
+            reach = reach.join(&shown.reach);
         }
         let mut top = reach.low[1];
         while top < reach.high[1] {

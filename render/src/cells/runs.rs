@@ -80,7 +80,10 @@ pub(super) fn go_on(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open:
 }
 
 #[inline(always)]
-#[expect(clippy::double_comparisons, reason = "a depth that is no number is neither less nor more, but not the same")]
+#[expect(
+    clippy::double_comparisons,
+    reason = "a depth that is no number is neither less nor more, but not the same"
+)]
 fn go_on_by<E: Eight>(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
     let mut mm = [0.0; BATCH];
     for first in (0..raws.len()).step_by(BATCH) {

@@ -116,25 +116,30 @@ const FACES: [([usize; 3], [usize; 3]); 4] =
 /// What is gathered before it is handed on.
 const GATHERED: usize = 512;
 
+/// Pixels of a row, a multiple of [`LANES`], that are gone through before it is asked whether that is so.
+const AHEAD: usize = 128;
+/// There is room for these, and for a group that is not written whole.
+const ROOM: usize = GATHERED + AHEAD + LANES;
+
 /// What rays have of cells, gathered until there is enough of it: a [`Raw`] each, part by part.
 #[derive(Debug)]
 pub(super) struct Raws {
-    fronts: [f64; GATHERED + LANES],
-    backs: [f64; GATHERED + LANES],
-    from: [f32; GATHERED + LANES],
-    to: [f32; GATHERED + LANES],
-    pixels: [u32; GATHERED + LANES],
+    fronts: [f64; ROOM],
+    backs: [f64; ROOM],
+    from: [f32; ROOM],
+    to: [f32; ROOM],
+    pixels: [u32; ROOM],
     count: usize,
 }
 
 impl Default for Raws {
     fn default() -> Self {
         Self {
-            fronts: [0.0; GATHERED + LANES],
-            backs: [0.0; GATHERED + LANES],
-            from: [0.0; GATHERED + LANES],
-            to: [0.0; GATHERED + LANES],
-            pixels: [0; GATHERED + LANES],
+            fronts: [0.0; ROOM],
+            backs: [0.0; ROOM],
+            from: [0.0; ROOM],
+            to: [0.0; ROOM],
+            pixels: [0; ROOM],
             count: 0,
         }
     }
@@ -192,8 +197,7 @@ impl Raws {
     /// Adds what those rays of a group pass that do.
     #[inline(always)]
     fn add_all<F: Four>(&mut self, first: u32, passed: &Passed<F>, hit: u32) {
-        // There is room for a group beyond what counts as full.
-        let at = self.count.min(GATHERED);
+        let at = self.count.min(ROOM - LANES);
         let [front, back] = passed.depths;
         let [from, to] = passed.values;
         if let Some(fronts) = self.fronts[at..].first_chunk_mut() {
@@ -282,19 +286,23 @@ fn plain<F: Four, const NEAR: usize, const PERSPECTIVE: bool>(
         let row = cell.row(j);
         let mut i = reach.low[0];
         while i < reach.high[0] {
-            let lanes = LANES.min((reach.high[0] - i) as usize);
-            let within = (1 << lanes) - 1;
-            let passed = cell.pass::<F, NEAR, PERSPECTIVE>(&row, i);
-            let first = (before + i) as u32;
-            if passed.clear & within == within {
-                raws.add_all(first, &passed, passed.hit & within);
-            } else {
-                unsure(of, [i, j], first, lanes, PERSPECTIVE, raws);
+            // For as many at once as there is room for.
+            let end = reach.high[0].min(i + AHEAD as i32);
+            while i < end {
+                let lanes = LANES.min((end - i) as usize);
+                let within = (1 << lanes) - 1;
+                let passed = cell.pass::<F, NEAR, PERSPECTIVE>(&row, i);
+                let first = (before + i) as u32;
+                if passed.clear & within == within {
+                    raws.add_all(first, &passed, passed.hit & within);
+                } else {
+                    unsure(of, [i, j], first, lanes, PERSPECTIVE, raws);
+                }
+                i += LANES as i32;
             }
             if raws.count >= GATHERED {
                 full(raws.take());
             }
-            i += LANES as i32;
         }
     }
 }

@@ -1,14 +1,14 @@
 //! Many segments at once: those within one piece, and after that those that pass from one into another.
 
 use super::lanes::{Many, Means, Source};
-use super::opacity::{THIN, behind, opacity, thin};
+use super::opacity::{THIN, thick, thin};
 use super::{EVEN_COLOR, EVEN_DEPTH, Place, Table};
 use crate::simd::{Eight, put_from};
 
 /// Numbers that go through arithmetic together.
 const WIDE: usize = 8;
 /// Segments that go at once.
-pub(in super::super) const BATCH: usize = 520;
+pub(in super::super) const BATCH: usize = 640;
 
 /// Several segments, and what is seen of them.
 #[derive(Debug)]
@@ -54,24 +54,20 @@ fn shade<E: Eight>(means: &Means<E>, mm: E) -> ([E; 4], u32) {
     let tau = rate * mm;
     // Rounding may leave less than nothing.
     let tau = tau.below(none, none, tau);
-    let (mut parts, mut lags, mut opacities) = ([0.0; WIDE], [0.0; WIDE], [0.0; WIDE]);
-    let taus = tau.to_array();
-    for n in 0..WIDE {
-        [parts[n], lags[n], opacities[n]] = thin(taus[n]);
-    }
+    let [mut part, mut lag, mut seen] = thin(tau, E::all);
     if tau.bits_below(E::all(THIN)) != 0xff {
+        let taus = tau.to_array();
+        let (mut parts, mut lags, mut opacities) = ([0.0; WIDE], [0.0; WIDE], [0.0; WIDE]);
         for n in 0..WIDE {
-            let tau = taus[n];
-            let is_thin = tau < THIN;
-            let opacity = opacity(tau);
-            parts[n] = if is_thin { parts[n] } else { opacity / tau };
-            lags[n] = if is_thin { lags[n] } else { behind(tau, opacity) };
-            opacities[n] = if is_thin { opacities[n] } else { opacity };
+            [parts[n], lags[n], opacities[n]] = thick(taus[n]);
         }
+        part = tau.below(E::all(THIN), part, E::from_array(parts));
+        lag = tau.below(E::all(THIN), lag, E::from_array(lags));
+        seen = tau.below(E::all(THIN), seen, E::from_array(opacities));
     }
-    let (parts, lags) = (none.below(tau, E::from_array(parts) * mm, none), E::from_array(lags));
+    let part = none.below(tau, part * mm, none);
     let [x, y, z] = means.turn;
-    let seen = [r * parts + x * lags, g * parts + y * lags, b * parts + z * lags, E::from_array(opacities)];
+    let seen = [r * part + x * lag, g * part + y * lag, b * part + z * lag, seen];
     // What is no number is not smooth.
     let smooth = (means.rough * mm).bits_below(E::all(EVEN_DEPTH)) & tau.bits_below(E::all(f32::INFINITY));
     (seen, !smooth & 0xff)

@@ -1,28 +1,37 @@
 //! What is seen of an optical depth.
 
+use std::ops::{Mul, Sub};
+
 /// Optical depth below which series are as good as the exponential.
 pub(super) const THIN: f32 = 0.25;
-
-/// By how much the share of the colour at the end of a stretch falls behind that at its begin.
-#[inline(always)]
-pub(super) fn behind(tau: f32, opacity: f32) -> f32 {
-    if tau < THIN { thin(tau)[1] } else { opacity / tau - 1.0 + 0.5 * opacity }
-}
 
 /// 1 - e^-τ, without loss where τ is small.
 #[inline(always)]
 pub(in super::super) fn opacity(tau: f32) -> f32 {
-    if tau < THIN { thin(tau)[2] } else { 1.0 - exp_minus(tau) }
+    shares(tau)[2]
 }
 
-/// Of a small τ of at least 0: opacity for one of τ, by how much colours fall [`behind`], and opacity.
+/// Of any τ above 0: opacity for one of τ; by how much the share of the colour at the end of a stretch falls behind that at
+/// its begin, less than nothing; and opacity.
 #[inline(always)]
-pub(super) fn thin(tau: f32) -> [f32; 3] {
-    let part = 1.0
-        - tau
-            * (1.0 / 2.0
-                - tau * (1.0 / 6.0 - tau * (1.0 / 24.0 - tau * (1.0 / 120.0 - tau * (1.0 / 720.0)))));
-    let lag = tau * tau * (tau * (1.0 / 24.0 - tau * (1.0 / 80.0 - tau * (1.0 / 360.0))) - 1.0 / 12.0);
+pub(super) fn shares(tau: f32) -> [f32; 3] {
+    if tau < THIN { thin(tau, |v| v) } else { thick(tau) }
+}
+
+/// The [`shares`] of a τ that is not small.
+#[inline(always)]
+pub(super) fn thick(tau: f32) -> [f32; 3] {
+    let opacity = 1.0 - exp_minus(tau);
+    [opacity / tau, opacity / tau - 1.0 + 0.5 * opacity, opacity]
+}
+
+/// The [`shares`] of a small τ, 0 or more. One number or several at once; `all` makes the same one of all.
+#[inline(always)]
+pub(super) fn thin<N: Copy + Sub<Output = N> + Mul<Output = N>>(tau: N, all: impl Fn(f32) -> N) -> [N; 3] {
+    let rest = all(1.0 / 24.0) - tau * (all(1.0 / 120.0) - tau * all(1.0 / 720.0));
+    let part = all(1.0) - tau * (all(1.0 / 2.0) - tau * (all(1.0 / 6.0) - tau * rest));
+    let rest = all(1.0 / 24.0) - tau * (all(1.0 / 80.0) - tau * all(1.0 / 360.0));
+    let lag = tau * tau * (tau * rest - all(1.0 / 12.0));
     [part, lag, tau * part]
 }
 

@@ -1,6 +1,6 @@
 //! What is seen of one segment, whatever it passes.
 
-use super::opacity::{behind, opacity};
+use super::opacity::shares;
 use super::{Cut, EVEN_COLOR, EVEN_DEPTH, Mean, Piece, Place, Table};
 
 /// In how many parts a piece goes at most; such a one is opaque long before its end.
@@ -22,11 +22,10 @@ impl Seen {
         let tau = rates[3] * mm;
         // Neither is anything seen of what is no number.
         if tau > 0.0 {
-            let opacity = opacity(tau);
-            let (part, behind) = (mm * opacity / tau, behind(tau, opacity));
+            let [part, lag, opacity] = shares(tau);
             let through = 1.0 - self.0[3];
             for c in 0..3 {
-                self.0[c] += through * (rates[c] * part + turn[c] * behind);
+                self.0[c] += through * (rates[c] * mm * part + turn[c] * lag);
             }
             self.0[3] += through * opacity;
         }
