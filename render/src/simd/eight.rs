@@ -23,12 +23,14 @@ pub(crate) trait Eight: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Out
 
     fn numbers(v: [u32; 8]) -> Self::Numbers;
     fn numbers_to_array(numbers: Self::Numbers) -> [u32; 8];
-    /// How many of a rising list each has reached, but for the first, which all have.
-    fn reached(self, rising: &[f32; 8]) -> Self::Numbers;
+    /// How many of a rising list each has reached.
+    fn reached(self, rising: &[f32]) -> Self::Numbers;
     /// Which are not one, a bit each.
     fn differ(a: Self::Numbers, b: Self::Numbers) -> u32;
     /// Looked up by numbers below eight.
     fn of_table(table: &[f32; 8], numbers: Self::Numbers) -> Self;
+    /// The same of twice eight, by numbers below sixteen.
+    fn of_tables(halves: &[[f32; 8]; 2], numbers: Self::Numbers) -> Self;
     /// The first of all rows, then the second of all, and so on.
     fn columns(rows: [&[f32; 8]; 8]) -> [Self; 8];
 }
@@ -95,8 +97,8 @@ impl Eight for Plain {
     }
 
     #[inline(always)]
-    fn reached(self, rising: &[f32; 8]) -> [u32; 8] {
-        self.0.map(|v| rising[1..].iter().fold(0, |count, begin| count + u32::from(*begin <= v)))
+    fn reached(self, rising: &[f32]) -> [u32; 8] {
+        self.0.map(|v| rising.iter().fold(0, |count, begin| count + u32::from(*begin <= v)))
     }
 
     #[inline(always)]
@@ -107,6 +109,11 @@ impl Eight for Plain {
     #[inline(always)]
     fn of_table(table: &[f32; 8], numbers: [u32; 8]) -> Self {
         Self(numbers.map(|number| table[number as usize & 7]))
+    }
+
+    #[inline(always)]
+    fn of_tables(halves: &[[f32; 8]; 2], numbers: [u32; 8]) -> Self {
+        Self(numbers.map(|number| halves[number as usize >> 3 & 1][number as usize & 7]))
     }
 
     #[inline(always)]
@@ -130,7 +137,7 @@ mod wide {
         _mm256_blendv_ps, _mm256_castpd_ps, _mm256_castps_pd, _mm256_castps_si256, _mm256_castps256_ps128,
         _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_div_ps, _mm256_extractf128_ps,
         _mm256_loadu_ps, _mm256_loadu_si256, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps,
-        _mm256_permutevar8x32_ps, _mm256_set1_ps, _mm256_setzero_si256, _mm256_storeu_ps,
+        _mm256_permutevar8x32_ps, _mm256_set1_ps, _mm256_setzero_si256, _mm256_slli_epi32, _mm256_storeu_ps,
         _mm256_storeu_si256, _mm256_sub_epi32, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps,
         _mm256_unpacklo_pd, _mm256_unpacklo_ps,
     };
@@ -249,10 +256,10 @@ mod wide {
         }
 
         #[inline(always)]
-        fn reached(self, rising: &[f32; 8]) -> __m256i {
+        fn reached(self, rising: &[f32]) -> __m256i {
             unsafe {
                 let mut count = _mm256_setzero_si256();
-                for begin in &rising[1..] {
+                for begin in rising {
                     // What is so is all ones, which is one less than nothing.
                     let reached = _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_set1_ps(*begin), self.0);
                     count = _mm256_sub_epi32(count, _mm256_castps_si256(reached));
@@ -269,6 +276,16 @@ mod wide {
         #[inline(always)]
         fn of_table(table: &[f32; 8], numbers: __m256i) -> Self {
             Self(unsafe { _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.as_ptr()), numbers) })
+        }
+
+        #[inline(always)]
+        fn of_tables([low, high]: &[[f32; 8]; 2], numbers: __m256i) -> Self {
+            let [low, high] = [Self::of_table(low, numbers), Self::of_table(high, numbers)];
+            unsafe {
+                // What tells the halves apart becomes the sign.
+                let which = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(numbers));
+                Self(_mm256_blendv_ps(low.0, high.0, which))
+            }
         }
 
         #[inline(always)]

@@ -100,10 +100,6 @@ impl Batch {
         let (from, to) = (eight::<E>(of.from, k), eight::<E>(of.to, k));
         let numbers = source.numbers(from);
         let across = E::differ(numbers, source.numbers(to));
-        let means = source.pieces(numbers).means(from, to);
-        let (seen, alone) = shade(&means, eight(of.mm, k));
-        let (low, high) = self.seen[k * WIDE..(k + 1) * WIDE].split_at_mut(4);
-        E::put_rows(seen, low, high);
         for half in 0..2 {
             let which = across >> (4 * half) & 15;
             if let Some(into) = self.across[self.count..].first_chunk_mut() {
@@ -111,6 +107,13 @@ impl Batch {
             }
             self.count += which.count_ones() as usize;
         }
+        if across == 0xff {
+            return 0;
+        }
+        let means = source.pieces(numbers).means(from, to);
+        let (seen, alone) = shade(&means, eight(of.mm, k));
+        let (low, high) = self.seen[k * WIDE..(k + 1) * WIDE].split_at_mut(4);
+        E::put_rows(seen, low, high);
         alone & !across
     }
 
@@ -159,8 +162,9 @@ impl Batch {
         self.seen[n] = table.segment(&from, &to, of.mm[n]);
     }
 
+    /// Integrates all, with pieces from a source.
     #[inline(always)]
-    fn all<E: Eight>(&mut self, source: &impl Source<E>, table: &Table, of: Stretches<'_>) {
+    pub(super) fn all<E: Eight>(&mut self, source: &impl Source<E>, table: &Table, of: Stretches<'_>) {
         self.count = 0;
         let count = of.mm.len().min(BATCH);
         for k in 0..count.div_ceil(WIDE) {
@@ -207,9 +211,12 @@ impl Table {
     /// As [`Self::segment`], of several; what is seen of them is in the batch then.
     #[inline(always)]
     pub(in super::super) fn segments<E: Eight>(&self, batch: &mut Batch, of: Stretches<'_>) {
-        match self.lanes.few() {
-            Some(few) => batch.all::<E>(&few, self, of),
-            None => batch.all::<E>(&Many::new(self), self, of),
+        if let Some(few) = self.lanes.few::<1>() {
+            batch.all::<E>(&few, self, of);
+        } else if let Some(few) = self.lanes.few::<2>() {
+            batch.all::<E>(&few, self, of);
+        } else {
+            batch.all::<E>(&Many::new(self), self, of);
         }
     }
 }

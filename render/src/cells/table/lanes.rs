@@ -3,8 +3,8 @@
 use super::Piece;
 use crate::simd::Eight;
 
-/// Pieces that fit into registers: one number of each.
-const FEW: usize = 8;
+/// Pieces of which one number each fits into a register, and into two.
+const FEW: [usize; 2] = [8, 16];
 
 /// What [`Piece`] has, by place.
 const BEGIN: usize = 0;
@@ -22,8 +22,11 @@ pub(super) struct Lanes {
     /// By piece, a line of a cache each.
     rows: Vec<Row>,
     /// By what they have, if they are few.
-    few: Option<Box<[[f32; FEW]; 16]>>,
+    few: Option<Box<Halves>>,
 }
+
+/// By what pieces have: the first eight and the next.
+type Halves = [[[f32; 8]; 2]; 16];
 
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
@@ -58,8 +61,8 @@ pub(super) trait Source<E: Eight> {
     fn pieces(&self, numbers: E::Numbers) -> Pieces<E>;
 }
 
-/// From registers.
-pub(super) struct Few<'a>(&'a [[f32; FEW]; 16]);
+/// From one register for each number, or from two.
+pub(super) struct Few<'a, const REGISTERS: usize>(&'a Halves);
 
 /// From memory.
 pub(super) struct Many<'a>(&'a super::Table);
@@ -67,19 +70,20 @@ pub(super) struct Many<'a>(&'a super::Table);
 impl Lanes {
     pub(super) fn new(pieces: &[Piece]) -> Self {
         let rows: Vec<Row> = pieces.iter().map(Row::new).collect();
-        let few = (rows.len() <= FEW).then(|| {
+        let few = (rows.len() <= FEW[1]).then(|| {
             // Where there are no more, nothing begins.
             let none = Row([[f32::INFINITY; 8]; 2]);
-            let row = |piece: usize| rows.get(piece).unwrap_or(&none);
-            Box::new(std::array::from_fn(|n| std::array::from_fn(|piece| row(piece).0[n / 8][n % 8])))
+            let number = |piece: usize, n: usize| rows.get(piece).unwrap_or(&none).0[n / 8][n % 8];
+            let half = |from: usize, n: usize| std::array::from_fn(|piece| number(from + piece, n));
+            Box::new(std::array::from_fn(|n| [half(0, n), half(8, n)]))
         });
         Self { rows, few }
     }
 
-    /// If pieces are few.
+    /// If pieces are few enough for so many registers.
     #[inline(always)]
-    pub(super) fn few(&self) -> Option<Few<'_>> {
-        self.few.as_deref().map(Few)
+    pub(super) fn few<const REGISTERS: usize>(&self) -> Option<Few<'_, REGISTERS>> {
+        self.few.as_deref().filter(|_| self.rows.len() <= FEW[REGISTERS - 1]).map(Few)
     }
 }
 
@@ -96,29 +100,37 @@ impl Row {
     }
 }
 
-impl<E: Eight> Source<E> for Few<'_> {
+impl<const REGISTERS: usize> Few<'_, REGISTERS> {
+    #[inline(always)]
+    fn of<E: Eight>(&self, what: usize, numbers: E::Numbers) -> E {
+        let halves = &self.0[what];
+        if REGISTERS == 1 { E::of_table(&halves[0], numbers) } else { E::of_tables(halves, numbers) }
+    }
+}
+
+impl<E: Eight, const REGISTERS: usize> Source<E> for Few<'_, REGISTERS> {
     #[inline(always)]
     fn numbers(&self, positions: E) -> E::Numbers {
-        positions.reached(&self.0[BEGIN])
+        // All have reached the first.
+        positions.reached(&self.0[BEGIN].as_flattened()[1..8 * REGISTERS])
     }
 
     #[inline(always)]
     fn pieces(&self, numbers: E::Numbers) -> Pieces<E> {
-        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, _] = self.0;
         Pieces {
-            begin: E::of_table(a, numbers),
-            end: E::of_table(b, numbers),
-            origin: E::of_table(c, numbers),
-            scale: E::of_table(d, numbers),
+            begin: self.of(BEGIN, numbers),
+            end: self.of(END, numbers),
+            origin: self.of(ORIGIN, numbers),
+            scale: self.of(SCALE, numbers),
             extinction: [
-                E::of_table(e, numbers),
-                E::of_table(f, numbers),
-                E::of_table(g, numbers),
-                E::of_table(h, numbers),
+                self.of(EXTINCTION, numbers),
+                self.of(EXTINCTION + 1, numbers),
+                self.of(EXTINCTION + 2, numbers),
+                self.of(EXTINCTION + 3, numbers),
             ],
-            color: [E::of_table(i, numbers), E::of_table(j, numbers), E::of_table(k, numbers)],
-            varies: E::of_table(l, numbers),
-            turn: [E::of_table(m, numbers), E::of_table(n, numbers), E::of_table(o, numbers)],
+            color: [self.of(COLOR, numbers), self.of(COLOR + 1, numbers), self.of(COLOR + 2, numbers)],
+            varies: self.of(VARIES, numbers),
+            turn: [self.of(TURN, numbers), self.of(TURN + 1, numbers), self.of(TURN + 2, numbers)],
         }
     }
 }

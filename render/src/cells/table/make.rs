@@ -67,19 +67,18 @@ impl Table {
         for number in 1..pieces.len() {
             pieces[number - 1].end = pieces[number].begin;
         }
-        let steps = (STEPS * pieces.len()).next_power_of_two();
-        let mut at = 0;
-        let first = (0..=steps).map(|step| {
-            // What rounds to a step may lie a little before it.
-            let from = step as f32 / steps as f32 * (1.0 - f32::EPSILON);
-            while pieces[at].end <= from {
-                at += 1;
-            }
-            at as u32
-        });
-        let steps = first.collect();
+        let ends: Vec<f32> = pieces.iter().map(|piece| piece.end).collect();
+        let count = (STEPS * pieces.len()).next_power_of_two();
+        // What rounds to a step may lie a little before it, and a little behind the next.
+        let piece = |step: usize, off: f32| {
+            let position = step as f32 / count as f32 * (1.0 + off);
+            ends.partition_point(|end| *end <= position) as u32
+        };
+        let steps: Vec<u32> = (0..=count).map(|step| piece(step, -f32::EPSILON)).collect();
+        let beyond = (1..=count).map(|step| piece(step, f32::EPSILON)).chain([pieces.len() as u32 - 1]);
+        let most = steps.iter().zip(beyond).fold(0, |most, (from, to)| most.max(to - from));
         let lanes = Lanes::new(&pieces);
-        Self { pieces, steps, lanes, first: low.value, per_value, clear }
+        Self { pieces, steps, most, ends, lanes, first: low.value, per_value, clear }
     }
 }
 

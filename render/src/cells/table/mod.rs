@@ -67,8 +67,12 @@ impl Place {
 #[derive(Debug)]
 pub(super) struct Table {
     pieces: Vec<Piece>,
-    /// For positions from 0 to 1 in even steps, a piece that does not lie behind them.
+    /// For positions from 0 to 1 in even steps, a piece that does not lie behind them, from which on no more than so many
+    /// come before that of any position up to the next step.
     steps: Vec<u32>,
+    most: u32,
+    /// Where each piece ends.
+    ends: Vec<f32>,
     lanes: Lanes,
     first: f64,
     per_value: f64,
@@ -133,8 +137,9 @@ impl Table {
         // `as` saturates, and takes what is no number for 0.
         let step = ((position * last as f32) as usize).min(last);
         let mut piece = if position < 0.0 { 0 } else { self.steps[step] as usize };
-        while self.pieces[piece].end <= position && piece + 1 < self.pieces.len() {
-            piece += 1;
+        // The last ends nowhere.
+        for _ in 0..self.most {
+            piece += usize::from(self.ends[piece] <= position);
         }
         piece
     }

@@ -1,3 +1,4 @@
+use super::lanes::Many;
 use super::{BATCH, Batch, Stretches, Table};
 use crate::simd::{Eight, PlainEight};
 use crate::volume::{ControlPoint, Transfer};
@@ -136,10 +137,14 @@ fn at_once(table: &Table, segments: &[([f32; 2], f32)]) -> Vec<[f32; 4]> {
 }
 
 fn at_once_by<E: Eight>(table: &Table, segments: &[([f32; 2], f32)]) -> Vec<[f32; 4]> {
+    of_all(segments, |batch, all| table.segments::<E>(batch, all))
+}
+
+fn of_all(segments: &[([f32; 2], f32)], integrate: impl FnOnce(&mut Batch, Stretches<'_>)) -> Vec<[f32; 4]> {
     let of = |part: fn(&([f32; 2], f32)) -> f32| -> Vec<f32> { segments.iter().map(part).collect() };
     let [from, to, mm] = [of(|s| s.0[0]), of(|s| s.0[1]), of(|s| s.1)];
     let mut batch = Batch::new();
-    table.segments::<E>(&mut batch, Stretches { from: &from, to: &to, mm: &mm });
+    integrate(&mut batch, Stretches { from: &from, to: &to, mm: &mm });
     batch.seen()[..segments.len()].to_vec()
 }
 
@@ -170,6 +175,28 @@ fn a_segment_is_the_same_in_any_company() {
             assert_eq!(at_once(&table, &[segment]), [*seen], "{name}, {segment:?}");
         }
     }
+}
+
+#[test]
+fn pieces_from_registers_are_those_from_memory() {
+    let mut state = 17;
+    let mut seen = [0; 2];
+    for (name, transfer) in functions() {
+        let table = Table::new(&transfer);
+        let segments: Vec<_> = (0..BATCH).map(|_| some(&transfer, &mut state)).collect();
+        let many = of_all(&segments, |batch, all| batch.all::<PlainEight>(&Many::new(&table), &table, all));
+        if let Some(few) = table.lanes.few::<1>() {
+            let few = of_all(&segments, |batch, all| batch.all::<PlainEight>(&few, &table, all));
+            assert_eq!(few, many, "{name}, one register");
+            seen[0] += 1;
+        }
+        if let Some(few) = table.lanes.few::<2>() {
+            let few = of_all(&segments, |batch, all| batch.all::<PlainEight>(&few, &table, all));
+            assert_eq!(few, many, "{name}, two registers");
+            seen[1] += 1;
+        }
+    }
+    assert!(seen[0] >= 3 && seen[1] > seen[0], "functions of all kinds: {seen:?}");
 }
 
 #[cfg(target_arch = "x86_64")]
