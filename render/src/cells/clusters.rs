@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::split;
+use super::{Options, split};
 use crate::volume::cells::{CellGrid, CellKind, Place};
 use crate::volume::{Point, Vector};
 
@@ -22,13 +22,18 @@ const CLUSTERS: usize = 128;
 /// What clusters are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Grain {
-    /// To be hidden by others before them, and to be shared out evenly.
+    /// To be passed over one by one, and shared out evenly though nobody knows what will be hidden of them.
     Fine,
     /// For long runs of cells.
     Coarse,
 }
 
 impl Grain {
+    /// Of what a picture is drawn with; `by_cells` says whether these are shared out.
+    pub(super) fn of(options: &Options, by_cells: bool) -> Self {
+        if by_cells && options.early.is_some() { Self::Fine } else { Self::Coarse }
+    }
+
     /// Tetrahedra in a cluster of a large grid at most.
     fn most(self) -> usize {
         match self {

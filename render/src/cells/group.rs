@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Weak};
 
-use super::clusters::{Clusters, Pack};
+use super::clusters::{Clusters, Grain, Pack};
 use super::link::{Link, LinkError};
 use super::orders::{Drawing, Order};
 use super::serve::serve;
@@ -84,7 +84,7 @@ impl<L: Link> Group<L> {
             return Err(lost.clone().into());
         }
         self.number += 1;
-        let ready = self.renderer.ready(item, camera, size, options)?;
+        let ready = self.renderer.ready(item, camera, size, options, Grain::of(options, true))?;
         let result = draw(&mut self.desk, &mut self.dealt, self.number, item, &ready, options, progress);
         match result {
             Ok(gathered) => Ok(ready.picture(gathered, options)),

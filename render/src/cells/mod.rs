@@ -248,7 +248,8 @@ impl CellRenderer {
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> Result<CellPicture, CellsError> {
         let count = options.workers.unwrap_or_else(rayon::current_num_threads);
-        let ready = self.ready(item, camera, size, options)?;
+        let by_cells = options.engine != Engine::Blocks;
+        let ready = self.ready(item, camera, size, options, Grain::of(options, by_cells))?;
         let (frame, manner) = (ready.placed.frame(), ready.manner(options));
         if count == 0 || count > MAX_WORKERS {
             return Err(CellsError::Workers);
@@ -264,6 +265,7 @@ impl CellRenderer {
         camera: &Camera,
         size: [u32; 2],
         options: &Options,
+        grain: Grain,
     ) -> Result<Ready, CellsError> {
         let begin = Instant::now();
         let [width, height] = size;
@@ -279,7 +281,6 @@ impl CellRenderer {
             return Err(CellsError::Early);
         }
         let view = View::new(camera, size)?;
-        let grain = if options.early.is_some() { Grain::Fine } else { Grain::Coarse };
         let prepared = self.prepare(std::slice::from_ref(item), grain)?;
         let Some(prepared) = prepared.into_iter().next() else { return Err(CellsError::Workers) };
         let prepare_ms = begin.elapsed().as_secs_f64() * 1e3;
