@@ -1,7 +1,7 @@
 //! A transfer function for segments on which the scalar runs linearly.
 //!
 //! The function is cut at its control points, and where opacity rises much also in between, such that in each piece colour runs
-//! linearly and extinction, the logarithm -ln(1 - a), is a cubic to within 1e-4 of its most there. Means of extinction and of its
+//! linearly and extinction, the logarithm -ln(1 - a), is a cubic to within 3e-4 of itself. Means of extinction and of its
 //! product with colour follow in closed form between any two places of a piece, without a difference that would lose digits.
 //!
 //! A mean says nothing about which colour lies in front: how much nearer the colour at the begin is than that at the end follows
@@ -10,7 +10,7 @@
 //! dimension, Engel 2001), which do where colour or optical depth is little.
 //!
 //! Many segments go at once (`batch`), what few it has no way for by themselves (`parts`). Of either, what is seen of a segment
-//! is within 0.2 of 1/255 of the truth.
+//! is within 0.2 of 1/255 of the truth: 0.09 of 2.4 million at and about control points.
 
 mod batch;
 mod lanes;
