@@ -71,8 +71,8 @@ impl Lanes {
     pub(super) fn new(pieces: &[Piece]) -> Self {
         let rows: Vec<Row> = pieces.iter().map(Row::new).collect();
         let few = (rows.len() <= FEW[1]).then(|| {
-            // Where there are no more, nothing begins.
-            let none = Row([[f32::INFINITY; 8]; 2]);
+            // Where there are no more, nothing begins that could be reached.
+            let none = Row([[f32::NAN; 8]; 2]);
             let number = |piece: usize, n: usize| rows.get(piece).unwrap_or(&none).0[n / 8][n % 8];
             let half = |from: usize, n: usize| std::array::from_fn(|piece| number(from + piece, n));
             Box::new(std::array::from_fn(|n| [half(0, n), half(8, n)]))

@@ -7,6 +7,8 @@ use crate::volume::Transfer;
 /// By how much of it extinction may be off in a piece, which is looked at in so many places.
 const SAME: f64 = 3e-4;
 const TRIED: u32 = 16;
+/// Widths below this have no inverse.
+const NARROW: f32 = 1e-37;
 /// Places for looking positions up, for each piece.
 const STEPS: usize = 8;
 
@@ -67,7 +69,10 @@ impl Table {
         for number in 1..pieces.len() {
             pieces[number - 1].end = pieces[number].begin;
         }
-        let ends: Vec<f32> = pieces.iter().map(|piece| piece.end).collect();
+        let last = pieces.len() - 1;
+        // Not even what is infinite lies behind the last.
+        let ends = pieces.iter().enumerate().map(|(n, piece)| if n < last { piece.end } else { f32::NAN });
+        let ends: Vec<f32> = ends.collect();
         let count = (STEPS * pieces.len()).next_power_of_two();
         // What rounds to a step may lie a little before it, and a little behind the next.
         let piece = |step: usize, off: f32| {
@@ -75,7 +80,7 @@ impl Table {
             ends.partition_point(|end| *end <= position) as u32
         };
         let steps: Vec<u32> = (0..=count).map(|step| piece(step, -f32::EPSILON)).collect();
-        let beyond = (1..=count).map(|step| piece(step, f32::EPSILON)).chain([pieces.len() as u32 - 1]);
+        let beyond = (1..=count).map(|step| piece(step, f32::EPSILON)).chain([last as u32]);
         let most = steps.iter().zip(beyond).fold(0, |most, (from, to)| most.max(to - from));
         let lanes = Lanes::new(&pieces);
         Self { pieces, steps, most, ends, lanes, first: low.value, per_value, clear }
@@ -100,10 +105,10 @@ impl Made {
         });
     }
 
-    /// Adds one up to a position, unless that is no way off.
+    /// Adds one up to a position, unless that is hardly any way off.
     fn push(&mut self, transfer: &Transfer, end: f32, [from, to]: [[f64; 4]; 2]) -> bool {
         let width = end - self.begin;
-        if width.is_nan() || width <= 0.0 {
+        if width.is_nan() || width < NARROW {
             return false;
         }
         let turn: [f64; 4] = std::array::from_fn(|c| to[c] - from[c]);
@@ -154,8 +159,10 @@ fn cuts([from, to]: [f64; 2]) -> Vec<f64> {
     let mut parts: Vec<f64> = [cap].into_iter().filter(|part| *part > 0.0 && *part < 1.0).collect();
     let mut left = vec![[from, to].map(|opacity| opacity.min(Transfer::MAX_OPACITY))];
     while let Some([from, to]) = left.pop() {
-        if !is_cubic([from, to]) {
-            let middle = 1.0 - ((1.0 - from) * (1.0 - to)).sqrt();
+        let middle = 1.0 - ((1.0 - from) * (1.0 - to)).sqrt();
+        let is_between = (middle - from) * (to - middle) > 0.0;
+        // Next to nothing there is no opacity between some.
+        if is_between && !is_cubic([from, to]) {
             parts.push(part_of(middle));
             left.extend([[from, middle], [middle, to]]);
         }

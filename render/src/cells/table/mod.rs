@@ -71,7 +71,7 @@ pub(super) struct Table {
     /// come before that of any position up to the next step.
     steps: Vec<u32>,
     most: u32,
-    /// Where each piece ends.
+    /// Where each piece ends; no number for the last.
     ends: Vec<f32>,
     lanes: Lanes,
     first: f64,
@@ -137,7 +137,6 @@ impl Table {
         // `as` saturates, and takes what is no number for 0.
         let step = ((position * last as f32) as usize).min(last);
         let mut piece = if position < 0.0 { 0 } else { self.steps[step] as usize };
-        // The last ends nowhere.
         for _ in 0..self.most {
             piece += usize::from(self.ends[piece] <= position);
         }

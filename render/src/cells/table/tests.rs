@@ -227,3 +227,25 @@ fn values_without_number_or_end_show_nothing_or_something() {
         assert!((1.0 - seen[3] - through * through).abs() < 1e-6, "constant outside: {seen:?}");
     }
 }
+
+#[test]
+fn functions_at_the_edge_of_numbers_have_tables() {
+    let color = |value: f64, a: f64| [value, 1.0, 0.5, 0.25, a];
+    let many: Vec<[f64; 5]> = (0..40).map(|i| color(f64::from(i), 0.01 * f64::from(i % 7))).collect();
+    let few = [color(0.0, 0.1), color(1.0, 0.2), color(2.0, 0.1)];
+    // Opacities with none between them, control points closer than any position, and values of which some are past all.
+    let least = [color(0.0, 0.0), color(1.0, 5e-324), color(2.0, 1e-310), color(3.0, 1e-17), color(4.0, 0.5)];
+    let close = [color(0.0, 0.5), color(1e-41, 0.1), color(1.0, 0.5)];
+    let wide = [color(-1e300, 0.1), color(0.0, 0.5), color(1e300, 0.1)];
+    for points in [&few[..], &many, &least, &close, &wide] {
+        let point = |&[value, r, g, b, a]: &[f64; 5]| ControlPoint { value, rgba: [r, g, b, a] };
+        let table = Table::new(&Transfer::new(points.iter().map(point).collect(), 1.0).expect("a function"));
+        let ends = [f32::NEG_INFINITY, -1.0, 0.0, 1e-42, 0.5, 1.0, 3e38, f32::INFINITY];
+        for segment in ends.iter().flat_map(|&a| ends.map(|b| ([a, b], 2.0))) {
+            let seen = at_once(&table, &[segment])[0];
+            assert!(seen.iter().all(|v| (0.0..=1.0).contains(v)), "{points:?}, {segment:?}: {seen:?}");
+        }
+        let thick = at_once(&table, &[([0.0, 1.0], 1e3), ([1e-42, 1.0], 1e3)]);
+        assert!(thick.iter().all(|seen| seen[3] > 0.9), "{points:?}: {thick:?}");
+    }
+}
