@@ -19,7 +19,7 @@ use super::lists::Log;
 use super::project::{Cluster, Frame, Projector};
 use super::scan::Rect;
 use super::stats::Counts;
-use super::worker::{Gathered, Kept, Manner};
+use super::worker::{Gathered, Manner, RowSegments};
 
 /// Pixels that a block is wide and high: at most, and where the picture is too small for [`EACH`] at least.
 const BLOCK: [usize; 2] = [64, 8];
@@ -100,7 +100,7 @@ impl<'a> Desk<'a> {
         Block { rect, near }: &Block,
         rows: &mut [&mut [[f32; 4]]],
         goes_on: impl Fn() -> bool,
-    ) -> Option<Vec<Kept>> {
+    ) -> Option<Vec<RowSegments>> {
         let Self { frame, manner, projector, log, known, counts, .. } = self;
         let early = manner.early.map(|early| early.threshold as f32);
         log.reset(rect.area());
@@ -137,8 +137,8 @@ impl<'a> Desk<'a> {
     }
 
     /// Composites the pixels of a row of a block, which begins with `first`.
-    fn composite(&mut self, first: usize, row: &mut [[f32; 4]]) -> Kept {
-        let mut kept = Kept::default();
+    fn composite(&mut self, first: usize, row: &mut [[f32; 4]]) -> RowSegments {
+        let mut kept = RowSegments::default();
         for (pixel, color) in (first..).zip(row) {
             self.list.clear();
             self.list.extend_from_slice(self.log.pixel(pixel));
@@ -194,7 +194,7 @@ impl Blocks {
 /// What threads have kept of rows of blocks, with the blocks' numbers; and what each of them did.
 #[derive(Default)]
 struct Drawn {
-    kept: Vec<(usize, Vec<Kept>)>,
+    kept: Vec<(usize, Vec<RowSegments>)>,
     counts: Vec<Counts>,
 }
 
@@ -253,7 +253,7 @@ pub(super) fn run(
     let Drawn { kept: mut drawn, mut counts } = drawn.into_inner().unwrap_or_else(PoisonError::into_inner);
     // Then blocks that stand side by side come one behind the other.
     drawn.sort_unstable_by_key(|&(block, _)| block);
-    let mut kept = vec![Kept::default(); height];
+    let mut kept = vec![RowSegments::default(); height];
     for (block, part) in drawn {
         for (row, more) in kept[block / across * side..].iter_mut().zip(part) {
             row.append(more);

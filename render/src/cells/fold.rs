@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use super::scan::Raw;
 use super::stats::Counts;
 use super::table::{Place, Table, opacity};
-use super::worker::Kept;
+use super::worker::RowSegments;
 
 /// A stretch of a pixel's ray with what is seen of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -185,7 +185,7 @@ pub(super) fn merge(segments: &[Segment], mut done: impl FnMut(Segment)) {
 #[inline(always)]
 pub(super) fn composite(
     list: &mut Vec<Segment>,
-    mut kept: Option<&mut Kept>,
+    mut kept: Option<&mut RowSegments>,
     counts: &mut Counts,
 ) -> [f32; 4] {
     // What comes one behind the other is in order.

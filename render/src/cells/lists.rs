@@ -1,5 +1,7 @@
 //! The lists of a worker: for each pixel the segments that are known, merged runs of cells.
 
+use std::ops::Range;
+
 use super::fold::{Segment, merge, under};
 
 const NONE: u32 = u32::MAX;
@@ -142,24 +144,44 @@ impl Log {
 
     /// Puts all together by pixel, in the order in which they came.
     pub(super) fn close(&mut self) {
-        let mut begin = 0;
-        for end in &mut self.ends {
-            (*end, begin) = (begin, begin + *end);
-        }
-        if let Some(&any) = self.segments.first() {
-            // What there was before is written over.
-            self.by_pixel.resize(self.segments.len(), any);
-        }
-        for (&pixel, &segment) in self.pixels.iter().zip(&self.segments) {
-            let place = &mut self.ends[pixel as usize];
-            self.by_pixel[*place as usize] = segment;
-            *place += 1;
-        }
+        let pixels = self.pixels.iter().copied();
+        put_by_pixel(&mut self.ends, pixels.zip(self.segments.iter().copied()), &mut self.by_pixel);
     }
 
     /// The segments of a pixel, when all are put together.
     pub(super) fn pixel(&self, pixel: usize) -> &[Segment] {
-        let begin = if pixel == 0 { 0 } else { self.ends[pixel - 1] };
-        &self.by_pixel[begin as usize..self.ends[pixel] as usize]
+        &self.by_pixel[of_pixel(&self.ends, pixel)]
     }
+}
+
+/// Puts things together by pixel, in the order in which they come. `counts` says how many each pixel has, and then where those
+/// of the pixel end.
+#[inline(always)]
+pub(super) fn put_by_pixel<T: Copy>(
+    counts: &mut [u32],
+    things: impl ExactSizeIterator<Item = (u32, T)> + Clone,
+    by_pixel: &mut Vec<T>,
+) {
+    let mut begin = 0;
+    for count in &mut *counts {
+        (*count, begin) = (begin, begin + *count);
+    }
+    let Some((_, any)) = things.clone().next() else {
+        by_pixel.clear();
+        return;
+    };
+    // What there was before is written over.
+    by_pixel.resize(things.len(), any);
+    for (pixel, thing) in things {
+        let place = &mut counts[pixel as usize];
+        by_pixel[*place as usize] = thing;
+        *place += 1;
+    }
+}
+
+/// Where the things of a pixel are then.
+#[inline(always)]
+pub(super) fn of_pixel(ends: &[u32], pixel: usize) -> Range<usize> {
+    let begin = if pixel == 0 { 0 } else { ends[pixel - 1] };
+    begin as usize..ends[pixel] as usize
 }

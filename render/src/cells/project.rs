@@ -5,6 +5,7 @@ use super::early;
 use super::fold::{Segment, add_up, integrate, length, merge, overlap, put_in_order, sort};
 use super::in_view::{InView, Shown};
 use super::lens::Lens;
+use super::lists::{of_pixel, put_by_pixel};
 use super::runs::{MIXED, NONE, Open, Run, go_on};
 use super::scan::{Found, Raw, Raws, Rect, scan};
 use super::stats::Counts;
@@ -79,8 +80,7 @@ impl Gathered {
     /// What the ray of a pixel has, nearest first, and what is seen of each.
     #[inline(always)]
     pub(super) fn pixel(&self, pixel: usize) -> (&[Raw], &[[f32; 4]]) {
-        let from = if pixel == 0 { 0 } else { self.ends[pixel - 1] };
-        let range = from as usize..self.ends[pixel] as usize;
+        let range = of_pixel(&self.ends, pixel);
         (&self.raws[range.clone()], &self.seen[range])
     }
 
@@ -276,18 +276,8 @@ impl Projector {
     /// Puts what was scan-converted together by pixel; `counts` become where each pixel's end.
     #[inline(always)]
     fn order(&mut self) {
-        let mut begin = 0;
-        for count in &mut self.counts {
-            (*count, begin) = (begin, begin + *count);
-        }
-        self.ordered.clear();
-        let Some(&any) = self.raws.first() else { return };
-        self.ordered.resize(self.raws.len(), any);
-        for raw in &self.raws {
-            let place = &mut self.counts[raw.pixel as usize];
-            self.ordered[*place as usize] = *raw;
-            *place += 1;
-        }
+        let raws = self.raws.iter().map(|raw| (raw.pixel, *raw));
+        put_by_pixel(&mut self.counts, raws, &mut self.ordered);
     }
 
     /// Scan-converts what is chosen, in one tile, and merges it.

@@ -65,7 +65,7 @@ enum Phase {
 
 /// What is kept of the segments of pixels side by side.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Kept {
+pub(super) struct RowSegments {
     /// How many each pixel has; empty where they are not kept.
     pub(super) counts: Vec<u32>,
     pub(super) segments: Vec<Segment>,
@@ -77,7 +77,7 @@ pub(super) struct Gathered {
     /// Colours, row by row.
     pub(super) pixels: Vec<[f32; 4]>,
     /// Segments of each row.
-    pub(super) kept: Vec<Kept>,
+    pub(super) kept: Vec<RowSegments>,
     /// What each worker did.
     pub(super) counts: Vec<Counts>,
 }
@@ -112,7 +112,7 @@ pub(super) struct Worker<'a, L> {
     gathered: Gathered,
 }
 
-impl Kept {
+impl RowSegments {
     /// Puts more pixels behind it.
     pub(super) fn append(&mut self, mut more: Self) {
         self.counts.append(&mut more.counts);
@@ -127,7 +127,8 @@ impl<'a, L: Link> Worker<'a, L> {
         let workers = link.size();
         queue.reverse();
         let first = usize::from(link.rank() == 0);
-        let (pixels, kept) = (vec![[0.0; 4]; first * width * height], vec![Kept::default(); first * height]);
+        let (pixels, kept) =
+            (vec![[0.0; 4]; first * width * height], vec![RowSegments::default(); first * height]);
         Self {
             frame,
             manner,
@@ -278,10 +279,10 @@ impl<'a, L: Link> Worker<'a, L> {
                 let counted = if self.manner.keep { width } else { 0 };
                 let sum: u64 = counts.iter().map(|&count| u64::from(count)).sum();
                 let whole = colors.len() == width && counts.len() == counted && sum == segments.len() as u64;
-                if !whole || row >= self.frame.size[1] {
+                if !whole || row as usize >= self.gathered.kept.len() {
                     return Err(nonsense);
                 }
-                self.put(row as usize, &colors, Kept { counts, segments });
+                self.put(row as usize, &colors, RowSegments { counts, segments });
             }
             Message::Counts(list) => {
                 self.gathered.counts[from] = Counts::from_list(&list).ok_or(nonsense)?;
@@ -478,15 +479,15 @@ impl<'a, L: Link> Worker<'a, L> {
     }
 
     /// Puts a finished row into the picture, which the first worker has.
-    fn put(&mut self, y: usize, colors: &[[f32; 4]], kept: Kept) {
+    fn put(&mut self, y: usize, colors: &[[f32; 4]], kept: RowSegments) {
         self.gathered.pixels[y * colors.len()..][..colors.len()].copy_from_slice(colors);
         self.gathered.kept[y] = kept;
     }
 
     /// Composites a row.
-    fn row(&mut self, y: usize) -> (Vec<[f32; 4]>, Kept) {
+    fn row(&mut self, y: usize) -> (Vec<[f32; 4]>, RowSegments) {
         let width = self.frame.size[0] as usize;
-        let (mut colors, mut row) = (Vec::with_capacity(width), Kept::default());
+        let (mut colors, mut row) = (Vec::with_capacity(width), RowSegments::default());
         let mut list: Vec<Segment> = Vec::new();
         let rank = self.link.rank();
         let counts = &mut self.gathered.counts[rank];

@@ -143,11 +143,11 @@ impl Batch {
         let mut rows = [[0.0; 4]; WIDE];
         let (low, high) = rows.split_at_mut(4);
         E::put_rows(seen, low, high);
-        for (row, &which) in rows.iter().zip(&which[..(self.count - k * WIDE).min(WIDE)]) {
+        let count = (self.count - k * WIDE).min(WIDE);
+        for (row, &which) in rows.iter().zip(&which[..count]) {
             self.seen[which as usize] = *row;
         }
         if alone != 0 {
-            let count = (self.count - k * WIDE).min(WIDE);
             for n in (0..count).filter(|n| alone >> n & 1 == 1) {
                 self.alone(table, of, which[n] as usize);
             }
