@@ -145,7 +145,7 @@ impl Log {
     /// Puts all together by pixel, in the order in which they came.
     pub(super) fn close(&mut self) {
         let pixels = self.pixels.iter().copied();
-        put_by_pixel(&mut self.ends, pixels.zip(self.segments.iter().copied()), &mut self.by_pixel);
+        put_by_pixel(&mut self.ends, pixels.zip(&self.segments), &mut self.by_pixel);
     }
 
     /// The segments of a pixel, when all are put together.
@@ -157,16 +157,16 @@ impl Log {
 /// Puts things together by pixel, in the order in which they come. `counts` says how many each pixel has, and then where those
 /// of the pixel end.
 #[inline(always)]
-pub(super) fn put_by_pixel<T: Copy>(
+pub(super) fn put_by_pixel<'a, T: Copy + 'a>(
     counts: &mut [u32],
-    things: impl ExactSizeIterator<Item = (u32, T)> + Clone,
+    things: impl ExactSizeIterator<Item = (u32, &'a T)> + Clone,
     by_pixel: &mut Vec<T>,
 ) {
     let mut begin = 0;
     for count in &mut *counts {
         (*count, begin) = (begin, begin + *count);
     }
-    let Some((_, any)) = things.clone().next() else {
+    let Some((_, &any)) = things.clone().next() else {
         by_pixel.clear();
         return;
     };
@@ -174,7 +174,7 @@ pub(super) fn put_by_pixel<T: Copy>(
     by_pixel.resize(things.len(), any);
     for (pixel, thing) in things {
         let place = &mut counts[pixel as usize];
-        by_pixel[*place as usize] = thing;
+        by_pixel[*place as usize] = *thing;
         *place += 1;
     }
 }

@@ -276,7 +276,7 @@ impl Projector {
     /// Puts what was scan-converted together by pixel; `counts` become where each pixel's end.
     #[inline(always)]
     fn order(&mut self) {
-        let raws = self.raws.iter().map(|raw| (raw.pixel, *raw));
+        let raws = self.raws.iter().map(|raw| (raw.pixel, raw));
         put_by_pixel(&mut self.counts, raws, &mut self.ordered);
     }
 
