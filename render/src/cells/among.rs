@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::blocks::{Near, in_view};
+use super::blocks::{Near, fill, in_view};
 use super::clusters::Grain;
 use super::project::{Gathered, Projector};
 use super::scan::{Raw, Rect};
@@ -26,7 +26,8 @@ pub(crate) struct Among {
 
 impl Among {
     fn new(placed: Placed) -> Self {
-        let (near, _) = in_view(&placed.frame());
+        let (near, mut counts) = in_view(&placed.frame());
+        fill(&placed.frame(), &near, &mut counts);
         Self { placed, near }
     }
 
@@ -61,7 +62,8 @@ impl Strip {
         for (block, left) in self.blocks.iter_mut().zip((0..width).step_by(BLOCK)) {
             let right = left.saturating_add(BLOCK as i32).min(width);
             let rect = Rect { low: [left, row(rows.start)], high: [right, row(rows.end)] };
-            let clusters = near.iter().filter(|near| !near.reach.meet(&rect).is_empty()).map(Near::cluster);
+            let reaching = near.iter().filter(|near| !near.reach.meet(&rect).is_empty());
+            let clusters = reaching.filter_map(Near::known);
             self.projector.gather(&frame, &rect, clusters, block, &mut self.counts);
         }
     }

@@ -7,16 +7,17 @@
 
 use std::cmp::Reverse;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 
 use super::CellsError;
-use super::early;
+use super::early::Ending;
 use super::fold::{Segment, composite};
 use super::in_view::{Chosen, InView};
 use super::lists::Log;
-use super::project::{Cluster, Frame, Projector};
+use super::project::{Frame, Projector, Sink};
+use super::runs::Run;
 use super::scan::Rect;
 use super::stats::Counts;
 use super::worker::{Gathered, Manner, RowSegments};
@@ -29,15 +30,26 @@ const EACH: usize = 8;
 /// A cluster that may show.
 #[derive(Debug)]
 pub(super) struct Near {
-    pub(super) cluster: usize,
+    cluster: usize,
     /// Pixels that it may show in.
     pub(super) reach: Rect,
-    pub(super) view: InView,
+    nearest: f64,
+    view: OnceLock<InView>,
 }
 
 impl Near {
-    pub(super) fn cluster(&self) -> Cluster<'_> {
-        Cluster { cluster: self.cluster, view: &self.view }
+    /// What of it is before the camera, if that was found.
+    pub(super) fn known(&self) -> Option<&InView> {
+        self.view.get()
+    }
+
+    /// What of it is before the camera, found now if it was not; cells that cannot show are counted then.
+    fn view(&self, frame: &Frame<'_>, scratch: &mut Vec<Chosen>, counts: &mut Counts) -> &InView {
+        self.view.get_or_init(|| {
+            let mut view = InView::default();
+            view.fill(frame, self.cluster, scratch, counts);
+            view
+        })
     }
 }
 
@@ -47,23 +59,24 @@ pub(super) fn in_view(frame: &Frame<'_>) -> (Vec<Near>, Counts) {
     let mut shown = Vec::new();
     for cluster in 0..frame.clusters.len() {
         if let Some((reach, nearest)) = frame.shows(cluster, &mut counts) {
-            // Bits of floats are in their order where they are not negative.
-            shown.push((nearest.max(0.0).to_bits(), cluster, reach));
+            shown.push(Near { cluster, reach, nearest: nearest.max(0.0), view: OnceLock::new() });
         }
     }
-    shown.sort_unstable_by_key(|&(nearest, cluster, _)| (nearest, cluster));
-    let fill = |scratch: &mut Vec<Chosen>, &(_, cluster, reach): &(u64, usize, Rect)| {
-        let (mut view, mut counts) = (InView::default(), Counts::default());
-        view.fill(frame, cluster, scratch, &mut counts);
-        (Near { cluster, reach, view }, counts)
+    shown.sort_unstable_by(|a, b| a.nearest.total_cmp(&b.nearest).then(a.cluster.cmp(&b.cluster)));
+    (shown, counts)
+}
+
+/// Brings all clusters before the camera, where all are needed; cells that cannot show are counted.
+pub(super) fn fill(frame: &Frame<'_>, near: &[Near], counts: &mut Counts) {
+    let fill = |scratch: &mut Vec<Chosen>, near: &Near| {
+        let mut counts = Counts::default();
+        near.view(frame, scratch, &mut counts);
+        counts
     };
-    let near: Vec<(Near, Counts)> = shown.par_iter().with_min_len(8).map_init(Vec::new, fill).collect();
-    let near = near.into_iter().map(|(near, more)| {
+    let each: Vec<Counts> = near.par_iter().with_min_len(8).map_init(Vec::new, fill).collect();
+    for more in each {
         counts.add(more);
-        near
-    });
-    let near = near.collect();
-    (near, counts)
+    }
 }
 
 /// What a thread keeps from block to block.
@@ -72,10 +85,11 @@ struct Desk<'a> {
     manner: Manner,
     near: &'a [Near],
     projector: Projector,
+    scratch: Vec<Chosen>,
     log: Log,
-    /// What comes through all that is known of each pixel, and how deep that reaches; with early termination only.
-    known: Vec<(f32, f64)>,
     list: Vec<Segment>,
+    /// The most that colours have.
+    most: [f32; 3],
     counts: Counts,
 }
 
@@ -86,9 +100,10 @@ impl<'a> Desk<'a> {
             manner,
             near,
             projector: Projector::default(),
+            scratch: Vec::new(),
             log: Log::default(),
-            known: Vec::new(),
             list: Vec::new(),
+            most: frame.table.most(),
             counts: Counts { held: frame.clusters.held(), ..Counts::default() },
         }
     }
@@ -101,32 +116,21 @@ impl<'a> Desk<'a> {
         rows: &mut [&mut [[f32; 4]]],
         goes_on: impl Fn() -> bool,
     ) -> Option<Vec<RowSegments>> {
-        let Self { frame, manner, projector, log, known, counts, .. } = self;
-        let early = manner.early.map(|early| early.threshold as f32);
+        let Self { frame, manner, projector, scratch, log, counts, .. } = self;
         log.reset(rect.area());
         let [width, _] = rect.size();
-        let mut table = manner.early.map(|_| early::Table::new(rect, manner.side));
-        known.clear();
-        known.resize(if early.is_some() { rect.area() } else { 0 }, (1.0, 0.0));
+        let ending = manner.early.map(|early| Ending::new(rect, manner.side, early.threshold));
+        let mut sink = Drawing { log, ending };
         for &place in near {
             let of = &self.near[place as usize];
             counts.clusters += 1;
-            let mut ended = Vec::new();
-            projector.draw(frame, of.cluster(), rect, table.as_ref(), counts, |pixel, run| {
-                log.add(pixel, run);
-                if let (Some(threshold), Some((through, reach))) = (early, known.get_mut(pixel)) {
-                    *through *= 1.0 - run.rgba[3];
-                    *reach = reach.max(run.back);
-                    if 1.0 - *through >= threshold {
-                        ended.push((pixel, *reach));
-                    }
+            if sink.hides(&of.reach.meet(rect), of.nearest) {
+                counts.hidden += frame.clusters.count(of.cluster) as u64;
+            } else {
+                projector.draw(frame, of.view(frame, scratch, counts), rect, &mut sink, counts);
+                if let Some(ending) = &mut sink.ending {
+                    ending.table.refresh();
                 }
-            });
-            if let Some(table) = table.as_mut().filter(|_| !ended.is_empty()) {
-                for (pixel, depth) in ended {
-                    table.terminate(pixel, depth);
-                }
-                table.refresh();
             }
             if !goes_on() {
                 return None;
@@ -144,8 +148,46 @@ impl<'a> Desk<'a> {
             self.list.extend_from_slice(self.log.pixel(pixel));
             let kept = self.manner.keep.then_some(&mut kept);
             *color = composite(&mut self.list, kept, &mut self.counts);
+            if let Some(early) = &self.manner.early {
+                early.complete(color, self.most);
+            }
         }
         kept
+    }
+}
+
+/// A block that is being drawn.
+struct Drawing<'a> {
+    log: &'a mut Log,
+    /// With early termination.
+    ending: Option<Ending>,
+}
+
+impl Sink for Drawing<'_> {
+    fn is_early(&self) -> bool {
+        self.ending.is_some()
+    }
+
+    fn hides(&self, rect: &Rect, nearest: f64) -> bool {
+        self.ending.as_ref().is_some_and(|ending| ending.table.hides(rect, nearest))
+    }
+
+    fn renews(&self) -> bool {
+        self.is_early()
+    }
+
+    fn renew(&mut self, rects: [&Rect; 2], runs: &[Run]) {
+        if let Some(ending) = &mut self.ending {
+            ending.look_at(rects, runs);
+        }
+    }
+
+    #[inline(always)]
+    fn done(&mut self, pixel: usize, run: Segment) {
+        self.log.add(pixel, run);
+        if let Some(ending) = &mut self.ending {
+            ending.add(pixel, &run);
+        }
     }
 }
 
@@ -205,7 +247,11 @@ pub(super) fn run(
     workers: usize,
     progress: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Result<Gathered, CellsError> {
-    let (near, skipped) = in_view(frame);
+    let (near, mut skipped) = in_view(frame);
+    // What ends early may need but some.
+    if manner.early.is_none() {
+        fill(frame, &near, &mut skipped);
+    }
     let Blocks { side, across, list: blocks } = Blocks::new(frame, &near, workers);
     // Those with most to do first, so that no thread is left with a long one in the end.
     let mut order: Vec<usize> = (0..blocks.len()).collect();

@@ -48,7 +48,7 @@ impl Writer {
         let Some(Body { points, tetrahedra }) = body else { return out.word(0) };
         let out = out.word(points.len() as u32).reals(points.iter().flatten()).word(tetrahedra.len() as u32);
         // A cluster has fewer points than 16 bits count.
-        tetrahedra.iter().flatten().fold(out, |out, &corner| out.put(&(corner as u16).to_le_bytes()))
+        tetrahedra.iter().flatten().fold(out, |out, &corner| out.put(&corner.to_le_bytes()))
     }
 
     pub(super) fn rgba(&mut self, v: &[f32; 4]) -> &mut Self {
@@ -113,7 +113,7 @@ impl Reader<'_> {
         let points = self.reals(count.checked_mul(3)?)?;
         let points = points.as_chunks::<3>().0.to_vec();
         let count = self.word()?;
-        let corner = |r: &mut Self| r.take().map(|bytes| u32::from(u16::from_le_bytes(bytes)));
+        let corner = |r: &mut Self| r.take().map(u16::from_le_bytes);
         let tetrahedra = self.some(count, 8, |r| Some([corner(r)?, corner(r)?, corner(r)?, corner(r)?]))?;
         Some(Pack { cluster, body: Some(Body { points, tetrahedra }), values })
     }

@@ -93,8 +93,8 @@ pub(super) struct Outline {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Body {
     pub(super) points: Vec<[f64; 3]>,
-    /// Corners of each, positions among the points.
-    pub(super) tetrahedra: Vec<[u32; 4]>,
+    /// Corners of each, positions among the points: of these there are eight for each of some thousand cells at most.
+    pub(super) tetrahedra: Vec<[u16; 4]>,
 }
 
 /// A tetrahedron with its corners' numbers in rising order.
@@ -166,8 +166,8 @@ impl Clusters {
         let mut body = Body::default();
         let mut size = 0.0;
         for part in of() {
-            // Every corner is among the numbers.
-            body.tetrahedra.push(part.corners.map(|n| numbers.binary_search(&n).unwrap_or(0) as u32));
+            // Every corner is among the numbers, and there are few enough.
+            body.tetrahedra.push(part.corners.map(|n| numbers.binary_search(&n).unwrap_or(0) as u16));
             self.cells.push(part.cell);
             let [a, b, c, d] = part.corners.map(|n| grid.points()[n as usize].coords);
             size += (a.sup(&b).sup(&c.sup(&d)) - a.inf(&b).inf(&c.inf(&d))).max();
@@ -216,7 +216,7 @@ impl Clusters {
         };
         let fits = body.points.len() == outline.points as usize
             && body.tetrahedra.len() == outline.tetrahedra as usize
-            && body.tetrahedra.iter().flatten().all(|&corner| corner < outline.points);
+            && body.tetrahedra.iter().flatten().all(|&corner| u32::from(corner) < outline.points);
         if fits {
             place.get_or_init(|| body);
         }
@@ -243,7 +243,7 @@ impl Clusters {
     }
 
     /// Corners of each tetrahedron of a cluster that is here, positions among its points.
-    pub(super) fn tetrahedra(&self, cluster: usize) -> &[[u32; 4]] {
+    pub(super) fn tetrahedra(&self, cluster: usize) -> &[[u16; 4]] {
         self.body(cluster).map_or(&[], |body| &body.tetrahedra)
     }
 

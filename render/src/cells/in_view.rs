@@ -2,7 +2,7 @@
 //! back. That is the same for any part of the picture, so that runs of cells are merged in one order everywhere.
 
 use super::project::Frame;
-use super::scan::{Corner, Rect};
+use super::scan::{Cells, Corner, Rect, Shown};
 use super::stats::Counts;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::WideFour;
@@ -11,15 +11,6 @@ use crate::volume::cells::Place;
 
 /// Steps of depth in which cells are told apart for going through them from front to back.
 const STEPS: usize = 1024;
-
-/// A tetrahedron that may show.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Shown {
-    pub(super) tetrahedron: u32,
-    /// Depth of its nearest corner, or a little less.
-    pub(super) nearest: f32,
-    pub(super) reach: Rect,
-}
 
 /// One with the depths of its corners, added.
 pub(super) type Chosen = (Shown, f64);
@@ -34,6 +25,12 @@ pub(super) struct InView {
 }
 
 impl InView {
+    /// Some of the cells, for scan conversion.
+    #[inline(always)]
+    pub(super) fn cells<'a>(&'a self, shown: &'a [Shown]) -> Cells<'a> {
+        Cells { corners: &self.corners, constants: &self.constants, shown }
+    }
+
     /// Brings a cluster before the camera; counts what cannot show. What is in it is forgotten; `scratch` is for reuse.
     pub(super) fn fill(
         &mut self,
@@ -104,7 +101,7 @@ impl InView {
         let of_points = frame.scalars.place() == Place::Points;
         let raw = frame.scalars.of(cluster);
         for (index, tetrahedron) in frame.clusters.tetrahedra(cluster).iter().enumerate() {
-            let [p, q, r, s] = tetrahedron.map(|v| v as usize);
+            let [p, q, r, s] = tetrahedron.map(usize::from);
             let values = if of_points { [raw[p], raw[q], raw[r], raw[s]] } else { [raw[index]; 4] };
             let (p, q) = (place::<F>(&self.corners[p]), place::<F>(&self.corners[q]));
             let (r, s) = (place::<F>(&self.corners[r]), place::<F>(&self.corners[s]));
@@ -130,7 +127,7 @@ impl InView {
                 continue;
             }
             let nearest = (nearest as f32).next_down();
-            chosen.push((Shown { tetrahedron: index as u32, nearest, reach }, depth));
+            chosen.push((Shown { corners: *tetrahedron, tetrahedron: index as u32, nearest, reach }, depth));
         }
     }
 

@@ -25,7 +25,7 @@
 //! grids that are sound have no such place.
 //!
 //! **Error**: below 1/255 in any channel; the parts that it is made of are said in `table`. With early termination, at most
-//! 1 - [`Early::threshold`] is added.
+//! half of 1 - [`Early::threshold`] is added.
 //!
 //! **Same bytes**: without early termination the picture and the segments do not depend on how the work is shared out and
 //! among how many, on the order of the grid's cells, or on the processor's instructions. With it they depend on the workers'

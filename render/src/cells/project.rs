@@ -1,13 +1,12 @@
 //! One cluster of cells, from points to segments of pixels.
 
 use super::clusters::{Clusters, Scalars};
-use super::early;
 use super::fold::{Segment, add_up, integrate, length, merge, overlap, put_in_order, sort};
-use super::in_view::{InView, Shown};
+use super::in_view::InView;
 use super::lens::Lens;
 use super::lists::{of_pixel, put_by_pixel};
 use super::runs::{MIXED, NONE, Open, Run, go_on};
-use super::scan::{Found, Raw, Raws, Rect, scan};
+use super::scan::{Found, Raw, Rect, Scanner, Shown};
 use super::stats::Counts;
 use super::table::{BATCH, Batch, Stretches, Table};
 use crate::simd::{Eight, Four, PlainEight, PlainFour};
@@ -16,6 +15,8 @@ use crate::simd::{WideEight, WideFour};
 
 /// Pixels that a cluster is drawn in at once, across and down: what it makes there has to be remembered.
 const TILE: i32 = 128;
+/// Cells after which it is asked which of the others can still be seen.
+const PART: usize = 512;
 
 /// What is drawn, for all workers.
 #[derive(Debug)]
@@ -113,18 +114,36 @@ impl Gathered {
     }
 }
 
-/// A cluster, and what of it is before the camera.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Cluster<'a> {
-    pub(super) cluster: usize,
-    pub(super) view: &'a InView,
+/// Who is handed what a projector draws.
+pub(super) trait Sink {
+    /// Whether some of it may not be seen.
+    fn is_early(&self) -> bool {
+        false
+    }
+
+    /// Whether nothing of a rectangle that lies behind a depth can be seen.
+    fn hides(&self, _: &Rect, _: f64) -> bool {
+        false
+    }
+
+    /// Whether it is of use to know of runs before all of a cluster is there.
+    fn renews(&self) -> bool {
+        false
+    }
+
+    /// What there is so far of the pixels of a tile, the second, within the rectangle that is drawn, the first.
+    fn renew(&mut self, _: [&Rect; 2], _: &[Run]) {}
+
+    /// A segment of a pixel.
+    fn done(&mut self, pixel: usize, run: Segment);
 }
 
 /// What is kept from cluster to cluster.
 #[derive(Debug, Default)]
 pub(super) struct Projector {
     shown: Vec<Shown>,
-    gathered: Box<Raws>,
+    part: Vec<Shown>,
+    scanner: Box<Scanner>,
     open: Open,
     raws: Vec<Raw>,
     counts: Vec<u32>,
@@ -137,14 +156,13 @@ impl Projector {
     pub(super) fn draw(
         &mut self,
         frame: &Frame<'_>,
-        of: Cluster<'_>,
+        of: &InView,
         rect: &Rect,
-        early: Option<&early::Table>,
+        sink: &mut impl Sink,
         counts: &mut Counts,
-        mut done: impl FnMut(usize, Segment),
     ) {
         if !frame.wide {
-            self.draw_by::<PlainFour>(frame, of, rect, early, counts, &mut done);
+            self.draw_by::<PlainFour>(frame, of, rect, sink, counts);
             return;
         }
         #[cfg(target_arch = "x86_64")]
@@ -153,18 +171,17 @@ impl Projector {
             fn wide(
                 projector: &mut Projector,
                 frame: &Frame<'_>,
-                of: Cluster<'_>,
+                of: &InView,
                 rect: &Rect,
-                early: Option<&early::Table>,
+                sink: &mut impl Sink,
                 counts: &mut Counts,
-                done: &mut impl FnMut(usize, Segment),
             ) {
-                projector.draw_by::<WideFour>(frame, of, rect, early, counts, done);
+                projector.draw_by::<WideFour>(frame, of, rect, sink, counts);
             }
             #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
             // SAFETY: `wide` is set only where these instructions were detected.
             unsafe {
-                wide(self, frame, of, rect, early, counts, &mut done);
+                wide(self, frame, of, rect, sink, counts);
             }
         }
     }
@@ -173,13 +190,12 @@ impl Projector {
     fn draw_by<F: Four>(
         &mut self,
         frame: &Frame<'_>,
-        of: Cluster<'_>,
+        of: &InView,
         rect: &Rect,
-        early: Option<&early::Table>,
+        sink: &mut impl Sink,
         counts: &mut Counts,
-        done: &mut impl FnMut(usize, Segment),
     ) {
-        let cells = &of.view.cells;
+        let cells = &of.cells;
         if let Some(&any) = cells.first() {
             self.shown.resize(cells.len(), any);
         }
@@ -191,8 +207,8 @@ impl Projector {
             kept += usize::from(!reach.is_empty());
         }
         self.shown.truncate(kept);
-        if let Some(table) = early {
-            self.shown.retain(|shown| !table.hides(&shown.reach, f64::from(shown.nearest)));
+        if sink.is_early() && !sink.renews() {
+            self.shown.retain(|shown| !sink.hides(&shown.reach, f64::from(shown.nearest)));
         }
         counts.hidden += (kept - self.shown.len()) as u64;
         counts.scanned += self.shown.len() as u64;
@@ -200,15 +216,12 @@ impl Projector {
         for shown in &self.shown {
             reach = reach.join(&shown.reach);
         }
-        let mut top = reach.low[1];
-        while top < reach.high[1] {
-            let mut left = reach.low[0];
-            while left < reach.high[0] {
-                let tile = Rect { low: [left, top], high: [left + TILE, top + TILE] }.meet(&reach);
-                self.convert::<F>(frame, of, [rect, &tile], counts, done);
-                left += TILE;
+        for top in (reach.low[1]..reach.high[1]).step_by(TILE as usize) {
+            for left in (reach.low[0]..reach.high[0]).step_by(TILE as usize) {
+                let high = [left.saturating_add(TILE), top.saturating_add(TILE)];
+                let tile = Rect { low: [left, top], high }.meet(&reach);
+                self.convert::<F>(frame, of, [rect, &tile], sink, counts);
             }
-            top += TILE;
         }
     }
 
@@ -217,7 +230,7 @@ impl Projector {
         &mut self,
         frame: &Frame<'_>,
         rect: &Rect,
-        clusters: impl Iterator<Item = Cluster<'a>>,
+        clusters: impl Iterator<Item = &'a InView>,
         gathered: &mut Gathered,
         counts: &mut Counts,
     ) {
@@ -226,7 +239,7 @@ impl Projector {
         self.raws.clear();
         for of in clusters {
             self.shown.clear();
-            let cells = of.view.cells.iter().filter(|shown| !shown.reach.meet(rect).is_empty());
+            let cells = of.cells.iter().filter(|shown| !shown.reach.meet(rect).is_empty());
             self.shown.extend(cells);
             counts.scanned += self.shown.len() as u64;
             if !frame.wide {
@@ -236,7 +249,7 @@ impl Projector {
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-                fn wide(projector: &mut Projector, frame: &Frame<'_>, of: Cluster<'_>, rect: &Rect) {
+                fn wide(projector: &mut Projector, frame: &Frame<'_>, of: &InView, rect: &Rect) {
                     projector.collect::<WideFour>(frame, of, rect, None);
                 }
                 #[expect(unsafe_code, reason = "instructions that this machine was asked for")]
@@ -285,55 +298,64 @@ impl Projector {
     fn convert<F: Four>(
         &mut self,
         frame: &Frame<'_>,
-        of: Cluster<'_>,
+        of: &InView,
         [rect, tile]: [&Rect; 2],
+        sink: &mut impl Sink,
         counts: &mut Counts,
-        done: &mut impl FnMut(usize, Segment),
     ) {
         self.open.begin(&frame.lens, tile);
-        let open = &mut self.open;
         let mut batch = Batch::new();
-        let tetrahedra = frame.clusters.tetrahedra(of.cluster);
-        let mut go_on = |raws: Found<'_>| {
-            counts.segments += raws.len() as u64;
-            go_on(frame, raws, &mut batch, open);
-        };
-        let perspective = frame.lens.perspective();
-        for shown in &self.shown {
-            let reach = shown.reach.meet(tile);
-            let index = shown.tetrahedron as usize;
-            let corners = tetrahedra[index].map(|v| &of.view.corners[v as usize]);
-            let cell = (corners, of.view.constants.get(index).copied());
-            scan::<F>(cell, [tile, &reach], perspective, &mut self.gathered, &mut go_on);
+        let mut segments = 0;
+        let part = if sink.renews() { PART } else { self.shown.len().max(1) };
+        for (n, shown) in self.shown.chunks(part).enumerate() {
+            let mut shown = shown;
+            if sink.renews() {
+                if n > 0 {
+                    sink.renew([rect, tile], &self.open.runs);
+                }
+                self.part.clear();
+                self.part.extend(shown.iter().filter(|one| !sink.hides(&one.reach, f64::from(one.nearest))));
+                counts.hidden += (shown.len() - self.part.len()) as u64;
+                counts.scanned -= (shown.len() - self.part.len()) as u64;
+                shown = &self.part;
+            }
+            let mut go_on = |raws: Found<'_>| {
+                segments += raws.len() as u64;
+                go_on(frame, raws, &mut batch, &mut self.open);
+            };
+            self.scanner.scan::<F>(of.cells(shown), [tile, tile], frame.lens.perspective(), &mut go_on);
+            go_on(self.scanner.rest());
         }
-        go_on(self.gathered.take());
+        counts.segments += segments;
         let [across, _] = tile.size();
         let mut mixed = false;
-        let open = &mut self.open;
-        let rows = open.runs.chunks_exact(across).zip(open.last.chunks_exact_mut(across));
+        let (open, area) = (&mut self.open, tile.area());
+        let rows = open.runs[..area].chunks_exact_mut(across).zip(open.last[..area].chunks_exact_mut(across));
         for (y, (runs, lasts)) in (tile.low[1]..).zip(rows) {
             let first = rect.number([tile.low[0], y]);
-            for (x, (run, last)) in runs.iter().zip(lasts).enumerate() {
+            for (x, (run, last)) in runs.iter_mut().zip(lasts).enumerate() {
                 if run.is_none() {
                     continue;
                 }
-                let Run(run) = run;
+                let run = std::mem::replace(run, Run::NONE).0;
                 let mut done = |run: Segment| {
                     if run.rgba[3] > 0.0 {
                         counts.runs += 1;
-                        done(first + x, run);
+                        sink.done(first + x, run);
                     }
                 };
                 if *last == NONE {
-                    done(*run);
+                    done(run);
                     continue;
                 }
                 self.spans.clear();
-                self.spans.push(*run);
+                self.spans.push(run);
                 while let Some(&(run, before)) = open.aside.get(*last as usize) {
                     self.spans.push(run);
                     *last = before;
                 }
+                // What came last is first.
+                self.spans.reverse();
                 put_in_order(&mut self.spans);
                 if overlap(&self.spans) {
                     (*last, mixed) = (MIXED, true);
@@ -344,32 +366,27 @@ impl Projector {
         }
         if mixed {
             let open = std::mem::take(&mut self.open);
-            self.one_by_one::<F>(frame, of, [rect, tile], &open.last, counts, done);
+            self.one_by_one::<F>(frame, of, [rect, tile], &open.last, sink, counts);
             self.open = open;
+            self.open.last[..area].fill(NONE);
         }
     }
 
     /// Appends the stretches of what is chosen; of the mixed pixels of `only`, if given.
     #[inline(always)]
-    fn collect<F: Four>(&mut self, frame: &Frame<'_>, of: Cluster<'_>, tile: &Rect, only: Option<&[u32]>) {
-        let tetrahedra = frame.clusters.tetrahedra(of.cluster);
-        for shown in &self.shown {
-            let reach = shown.reach.meet(tile);
-            let index = shown.tetrahedron as usize;
-            let corners = tetrahedra[index].map(|v| &of.view.corners[v as usize]);
-            let cell = (corners, of.view.constants.get(index).copied());
-            let (totals, raws) = (&mut self.counts, &mut self.raws);
-            let mut keep = |found: Found<'_>| {
-                for raw in (0..found.len()).map(|n| found.get(n)) {
-                    if only.is_none_or(|last| last[raw.pixel as usize] == MIXED) {
-                        totals[raw.pixel as usize] += 1;
-                        raws.push(raw);
-                    }
+    fn collect<F: Four>(&mut self, frame: &Frame<'_>, of: &InView, rect: &Rect, only: Option<&[u32]>) {
+        let (totals, raws) = (&mut self.counts, &mut self.raws);
+        let mut keep = |found: Found<'_>| {
+            for raw in (0..found.len()).map(|n| found.get(n)) {
+                if only.is_none_or(|last| last[raw.pixel as usize] == MIXED) {
+                    totals[raw.pixel as usize] += 1;
+                    raws.push(raw);
                 }
-            };
-            scan::<F>(cell, [tile, &reach], frame.lens.perspective(), &mut self.gathered, &mut keep);
-            keep(self.gathered.take());
-        }
+            }
+        };
+        let cells = of.cells(&self.shown);
+        self.scanner.scan::<F>(cells, [rect, rect], frame.lens.perspective(), &mut keep);
+        keep(self.scanner.rest());
     }
 
     /// The same for the mixed pixels, with all their stretches put in order before they are integrated.
@@ -377,11 +394,11 @@ impl Projector {
     fn one_by_one<F: Four>(
         &mut self,
         frame: &Frame<'_>,
-        of: Cluster<'_>,
+        of: &InView,
         [rect, tile]: [&Rect; 2],
         last: &[u32],
+        sink: &mut impl Sink,
         counts: &mut Counts,
-        done: &mut impl FnMut(usize, Segment),
     ) {
         self.counts.clear();
         self.counts.resize(tile.area(), 0);
@@ -413,7 +430,7 @@ impl Projector {
                 merge(&self.spans, |run| {
                     if run.rgba[3] > 0.0 {
                         counts.runs += 1;
-                        done(first + x, run);
+                        sink.done(first + x, run);
                     }
                 });
             }

@@ -29,7 +29,7 @@ pub(super) struct Run(pub(super) Segment);
 
 impl Run {
     /// Where there is none: nothing, that begins after all and ends at no depth.
-    const NONE: Self = Self(Segment { front: f64::INFINITY, back: f64::NAN, rgba: [0.0; 4] });
+    pub(super) const NONE: Self = Self(Segment { front: f64::INFINITY, back: f64::NAN, rgba: [0.0; 4] });
 
     /// Whether there is none.
     #[inline(always)]
@@ -41,10 +41,10 @@ impl Run {
 impl Open {
     /// For the pixels of a tile, with nothing in them.
     pub(super) fn begin(&mut self, lens: &Lens, tile: &Rect) {
-        self.runs.clear();
-        self.runs.resize(tile.area(), Run::NONE);
-        self.last.clear();
-        self.last.resize(tile.area(), NONE);
+        if self.runs.len() < tile.area() {
+            self.runs.resize(tile.area(), Run::NONE);
+            self.last.resize(tile.area(), NONE);
+        }
         self.aside.clear();
         self.stretches.clear();
         if lens.perspective() {
@@ -80,10 +80,6 @@ pub(super) fn go_on(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open:
 }
 
 #[inline(always)]
-#[expect(
-    clippy::double_comparisons,
-    reason = "a depth that is no number is neither less nor more, but not the same"
-)]
 fn go_on_by<E: Eight>(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
     let mut mm = [0.0; BATCH];
     for first in (0..raws.len()).step_by(BATCH) {
@@ -100,10 +96,22 @@ fn go_on_by<E: Eight>(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, ope
             }
         }
         frame.table.segments::<E>(batch, Stretches { from: raws.from, to: raws.to, mm });
-        let depths = raws.fronts.iter().zip(raws.backs);
-        let Open { runs, last, aside, .. } = &mut *open;
+        open.put(raws, batch.seen());
+    }
+}
+
+impl Open {
+    /// Goes on with the runs of pixels by stretches, of which `seen` is seen.
+    #[inline(never)]
+    #[expect(
+        clippy::double_comparisons,
+        reason = "a depth that is no number is neither less nor more, but not the same"
+    )]
+    fn put(&mut self, raws: Found<'_>, seen: &[[f32; 4]]) {
+        let Self { runs, last, aside, .. } = self;
         let runs = &mut runs[..];
-        for ((&pixel, &rgba), (&front, &back)) in raws.pixels.iter().zip(batch.seen()).zip(depths) {
+        let depths = raws.fronts.iter().zip(raws.backs);
+        for ((&pixel, &rgba), (&front, &back)) in raws.pixels.iter().zip(seen).zip(depths) {
             let Run(run) = &mut runs[pixel as usize];
             // It ends where this begins, or there is none: one question, since which of the two cannot be foreseen.
             if !(front < run.back || front > run.back) {
@@ -117,11 +125,15 @@ fn go_on_by<E: Eight>(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, ope
                 under(&mut new.rgba, run.rgba);
                 new.back = run.back;
             } else {
-                let last = &mut last[pixel as usize];
-                aside.push((*run, *last));
-                *last = (aside.len() - 1) as u32;
+                put_aside(*run, &mut last[pixel as usize], aside);
             }
             *run = new;
         }
     }
+}
+
+#[inline(never)]
+fn put_aside(run: Segment, last: &mut u32, aside: &mut Vec<(Segment, u32)>) {
+    aside.push((run, *last));
+    *last = (aside.len() - 1) as u32;
 }

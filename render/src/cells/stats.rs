@@ -7,7 +7,7 @@ pub struct Counts {
     pub outside: u64,
     /// Tetrahedra that the transfer function makes clear.
     pub clear: u64,
-    /// Tetrahedra that lie behind what is opaque enough; by blocks, once in each.
+    /// Tetrahedra that lie behind what is opaque enough; by blocks, once in each. All of a cluster that does as a whole.
     pub hidden: u64,
     /// Tetrahedra with a value or a place in the picture that is not a number; left out.
     pub not_finite: u64,

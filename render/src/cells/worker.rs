@@ -17,7 +17,8 @@ use super::fold::{Segment, composite};
 use super::in_view::{Chosen, InView};
 use super::link::{Link, LinkError};
 use super::lists::Lists;
-use super::project::{Cluster, Frame, Projector};
+use super::project::{Frame, Projector, Sink};
+use super::scan::Rect;
 use super::stats::Counts;
 use super::wire::Message;
 
@@ -69,6 +70,32 @@ pub(super) struct RowSegments {
     /// How many each pixel has; empty where they are not kept.
     pub(super) counts: Vec<u32>,
     pub(super) segments: Vec<Segment>,
+}
+
+impl Sink for Lists {
+    fn done(&mut self, pixel: usize, run: Segment) {
+        self.add(pixel, run);
+    }
+}
+
+/// What is drawn of a cluster where some may not be seen.
+struct Terminated<'a> {
+    table: &'a early::Table,
+    runs: &'a mut Vec<(usize, Segment)>,
+}
+
+impl Sink for Terminated<'_> {
+    fn is_early(&self) -> bool {
+        true
+    }
+
+    fn hides(&self, rect: &Rect, nearest: f64) -> bool {
+        self.table.hides(rect, nearest)
+    }
+
+    fn done(&mut self, pixel: usize, run: Segment) {
+        self.runs.push((pixel, run));
+    }
 }
 
 /// What the first worker has in the end.
@@ -368,15 +395,14 @@ impl<'a, L: Link> Worker<'a, L> {
             return;
         }
         self.view.fill(frame, cluster, &mut self.scratch, counts);
-        let of = Cluster { cluster, view: &self.view };
-        let (lists, picture) = (&mut self.lists, frame.rect());
+        let (of, lists, picture) = (&self.view, &mut self.lists, frame.rect());
         let Some((table, early)) = self.table.as_mut().zip(self.manner.early) else {
-            self.projector.draw(frame, of, &picture, None, counts, |pixel, run| lists.add(pixel, run));
+            self.projector.draw(frame, of, &picture, lists, counts);
             return;
         };
         self.runs.clear();
-        let runs = &mut self.runs;
-        self.projector.draw(frame, of, &picture, Some(table), counts, |pixel, run| runs.push((pixel, run)));
+        let mut sink = Terminated { table, runs: &mut self.runs };
+        self.projector.draw(frame, of, &picture, &mut sink, counts);
         for &(pixel, run) in &self.runs {
             if run.front >= table.pixel(pixel) {
                 counts.merged += 1;
@@ -489,6 +515,7 @@ impl<'a, L: Link> Worker<'a, L> {
         let width = self.frame.size[0] as usize;
         let (mut colors, mut row) = (Vec::with_capacity(width), RowSegments::default());
         let mut list: Vec<Segment> = Vec::new();
+        let most = self.frame.table.most();
         let rank = self.link.rank();
         let counts = &mut self.gathered.counts[rank];
         for pixel in y * width..(y + 1) * width {
@@ -497,7 +524,11 @@ impl<'a, L: Link> Worker<'a, L> {
             list.extend(self.lists.pixel(pixel));
             // The nearest clusters came first, and lists begin with what came last.
             list.reverse();
-            colors.push(composite(&mut list, kept, counts));
+            let mut color = composite(&mut list, kept, counts);
+            if let Some(early) = &self.manner.early {
+                early.complete(&mut color, most);
+            }
+            colors.push(color);
         }
         (colors, row)
     }

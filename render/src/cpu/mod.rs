@@ -360,7 +360,7 @@ impl CpuRenderer {
         let dark = f64::from(self.dark(quality));
         let ends_early = quality == Quality::Draft && dark > 0.0;
         cells::Options {
-            early: ends_early.then(|| Early { threshold: 1.0 - dark, ..Early::default() }),
+            early: ends_early.then(|| Early { threshold: 1.0 - 2.0 * dark, ..Early::default() }),
             skip_clear: self.skips.empty,
             wide: self.instructions == Instructions::Best,
             ..cells::Options::default()

@@ -19,14 +19,12 @@ pub(crate) trait Eight: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Out
     /// Which are less than those of a limit, a bit each.
     fn bits_below(self, limit: Self) -> u32;
     /// Writes four of each, together for each of eight.
-    fn put_rows(of: [Self; 4], low: &mut [[f32; 4]], high: &mut [[f32; 4]]);
+    fn put_rows(of: [Self; 4], into: &mut [[f32; 4]; 8]);
 
     fn numbers(v: [u32; 8]) -> Self::Numbers;
     fn numbers_to_array(numbers: Self::Numbers) -> [u32; 8];
     /// How many of a rising list each has reached.
     fn reached(self, rising: &[f32]) -> Self::Numbers;
-    /// Which are not one, a bit each.
-    fn differ(a: Self::Numbers, b: Self::Numbers) -> u32;
     /// Looked up by numbers below eight.
     fn of_table(table: &[f32; 8], numbers: Self::Numbers) -> Self;
     /// The same of twice eight, by numbers below sixteen.
@@ -80,8 +78,8 @@ impl Eight for Plain {
     }
 
     #[inline(always)]
-    fn put_rows(of: [Self; 4], low: &mut [[f32; 4]], high: &mut [[f32; 4]]) {
-        for (n, row) in low.iter_mut().chain(high).enumerate() {
+    fn put_rows(of: [Self; 4], into: &mut [[f32; 4]; 8]) {
+        for (n, row) in into.iter_mut().enumerate() {
             *row = of.map(|of| of.0[n]);
         }
     }
@@ -99,11 +97,6 @@ impl Eight for Plain {
     #[inline(always)]
     fn reached(self, rising: &[f32]) -> [u32; 8] {
         self.0.map(|v| rising.iter().fold(0, |count, begin| count + u32::from(*begin <= v)))
-    }
-
-    #[inline(always)]
-    fn differ(a: [u32; 8], b: [u32; 8]) -> u32 {
-        (0..8).fold(0, |bits, n| bits | u32::from(a[n] != b[n]) << n)
     }
 
     #[inline(always)]
@@ -133,13 +126,12 @@ pub(crate) use wide::Wide;
 )]
 mod wide {
     use std::arch::x86_64::{
-        __m256, __m256i, _CMP_LE_OQ, _CMP_LT_OQ, _mm_storeu_ps, _mm256_add_ps, _mm256_andnot_ps,
-        _mm256_blendv_ps, _mm256_castpd_ps, _mm256_castps_pd, _mm256_castps_si256, _mm256_castps256_ps128,
-        _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_div_ps, _mm256_extractf128_ps,
-        _mm256_loadu_ps, _mm256_loadu_si256, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps,
-        _mm256_permutevar8x32_ps, _mm256_set1_ps, _mm256_setzero_si256, _mm256_slli_epi32, _mm256_storeu_ps,
-        _mm256_storeu_si256, _mm256_sub_epi32, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps,
-        _mm256_unpacklo_pd, _mm256_unpacklo_ps,
+        __m256, __m256i, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_andnot_ps, _mm256_blendv_ps,
+        _mm256_castpd_ps, _mm256_castps_pd, _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps,
+        _mm256_div_ps, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_movemask_ps, _mm256_mul_ps,
+        _mm256_permute2f128_ps, _mm256_permutevar8x32_ps, _mm256_set1_ps, _mm256_setzero_si256,
+        _mm256_slli_epi32, _mm256_storeu_ps, _mm256_storeu_si256, _mm256_sub_epi32, _mm256_sub_ps,
+        _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps,
     };
     use std::ops::{Add, Mul, Sub};
 
@@ -233,13 +225,15 @@ mod wide {
         }
 
         #[inline(always)]
-        fn put_rows(of: [Self; 4], low: &mut [[f32; 4]], high: &mut [[f32; 4]]) {
-            let rows = transposed(of);
-            for ((row, low), high) in rows.into_iter().zip(low).zip(high) {
-                unsafe {
-                    _mm_storeu_ps(low.as_mut_ptr(), _mm256_castps256_ps128(row.0));
-                    _mm_storeu_ps(high.as_mut_ptr(), _mm256_extractf128_ps::<1>(row.0));
-                }
+        fn put_rows(of: [Self; 4], into: &mut [[f32; 4]; 8]) {
+            let [a, b, c, d] = transposed(of);
+            let ([ab, ab_high], [cd, cd_high]) = (halves(a, b), halves(c, d));
+            let into = into.as_flattened_mut().as_mut_ptr();
+            unsafe {
+                _mm256_storeu_ps(into, ab.0);
+                _mm256_storeu_ps(into.add(8), cd.0);
+                _mm256_storeu_ps(into.add(16), ab_high.0);
+                _mm256_storeu_ps(into.add(24), cd_high.0);
             }
         }
 
@@ -266,11 +260,6 @@ mod wide {
                 }
                 count
             }
-        }
-
-        #[inline(always)]
-        fn differ(a: __m256i, b: __m256i) -> u32 {
-            unsafe { !_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(a, b))) as u32 & 0xff }
         }
 
         #[inline(always)]

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use super::{PACKED, plain};
+use super::plain;
 
 /// Four numbers, each rounded as one alone is: all kinds give the same bits.
 pub(crate) trait Four: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
@@ -19,12 +19,17 @@ pub(crate) trait Four: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     fn most(self, other: Self) -> Self;
     /// Which are less than the other's, a bit each.
     fn below(self, other: Self) -> u32;
+    /// One number or another, by whether these are less than those of a limit.
+    fn either(self, limit: Self, yes: Self, no: Self) -> Self;
+    fn from_whole(v: [i32; 4]) -> Self;
+    /// Without what comes after the point.
+    fn to_whole(self) -> [i32; 4];
+    /// Writes eight whole numbers from `first` on.
+    fn put_rising(first: u32, into: &mut [u32; 8]);
+    /// Rounded to half as many digits.
+    fn to_f32(self) -> [f32; 4];
     /// Each two bits of `ORDER` say which comes there, the lowest first.
     fn picked<const ORDER: i32>(self) -> Self;
-    /// Writes those of which a bit is set one behind the other; what comes after them there is no matter.
-    fn put(self, which: u32, into: &mut [f64; 4]);
-    /// The same, rounded to half as many digits.
-    fn put_f32(self, which: u32, into: &mut [f32; 4]);
 }
 
 /// By whatever instructions there are.
@@ -75,22 +80,35 @@ impl Four for Plain {
     }
 
     #[inline(always)]
+    fn either(self, limit: Self, yes: Self, no: Self) -> Self {
+        Self(std::array::from_fn(|n| if self.0[n] < limit.0[n] { yes.0[n] } else { no.0[n] }))
+    }
+
+    #[inline(always)]
+    fn from_whole(v: [i32; 4]) -> Self {
+        Self(v.map(f64::from))
+    }
+
+    #[inline(always)]
+    fn to_whole(self) -> [i32; 4] {
+        self.0.map(|v| v as i32)
+    }
+
+    #[inline(always)]
+    fn put_rising(first: u32, into: &mut [u32; 8]) {
+        for (n, into) in (0..).zip(into) {
+            *into = first.wrapping_add(n);
+        }
+    }
+
+    #[inline(always)]
+    fn to_f32(self) -> [f32; 4] {
+        self.0.map(|v| v as f32)
+    }
+
+    #[inline(always)]
     fn picked<const ORDER: i32>(self) -> Self {
         Self(std::array::from_fn(|n| self.0[(ORDER >> (2 * n) & 3) as usize]))
-    }
-
-    #[inline(always)]
-    fn put(self, which: u32, into: &mut [f64; 4]) {
-        for (place, n) in into.iter_mut().zip(PACKED[(which & 15) as usize]) {
-            *place = self.0[n as usize];
-        }
-    }
-
-    #[inline(always)]
-    fn put_f32(self, which: u32, into: &mut [f32; 4]) {
-        for (place, n) in into.iter_mut().zip(PACKED[(which & 15) as usize]) {
-            *place = self.0[n as usize] as f32;
-        }
     }
 }
 
@@ -105,37 +123,21 @@ pub(crate) use wide::Wide;
 )]
 mod wide {
     use std::arch::x86_64::{
-        __m256d, _CMP_LT_OQ, _mm_loadu_si128, _mm_permutevar_ps, _mm_storeu_ps, _mm256_add_pd, _mm256_and_pd,
-        _mm256_castpd_ps, _mm256_castps_pd, _mm256_castsi256_pd, _mm256_cmp_pd, _mm256_cvtpd_ps,
-        _mm256_div_pd, _mm256_loadu_pd, _mm256_loadu_si256, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd,
-        _mm256_mul_pd, _mm256_permute4x64_pd, _mm256_permutevar8x32_ps, _mm256_set1_epi64x, _mm256_set1_pd,
-        _mm256_storeu_pd, _mm256_sub_pd,
+        __m256d, _CMP_LT_OQ, _mm_loadu_si128, _mm_storeu_ps, _mm_storeu_si128, _mm256_add_epi32,
+        _mm256_add_pd, _mm256_and_pd, _mm256_blendv_pd, _mm256_castsi256_pd, _mm256_cmp_pd,
+        _mm256_cvtepi32_pd, _mm256_cvtpd_ps, _mm256_cvttpd_epi32, _mm256_div_pd, _mm256_loadu_pd,
+        _mm256_loadu_si256, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd,
+        _mm256_permute4x64_pd, _mm256_set1_epi32, _mm256_set1_epi64x, _mm256_set1_pd, _mm256_storeu_pd,
+        _mm256_storeu_si256, _mm256_sub_pd,
     };
     use std::ops::{Add, Mul, Sub};
 
     use super::super::wide;
-    use super::{Four, PACKED};
+    use super::Four;
 
     /// By AVX2. Only code that is called where `has_wide` says yes names this type.
     #[derive(Debug, Clone, Copy)]
     pub(crate) struct Wide(__m256d);
-
-    /// [`PACKED`] for halves of numbers.
-    const PAIRS: [[u32; 8]; 16] = pairs();
-
-    const fn pairs() -> [[u32; 8]; 16] {
-        let mut pairs = [[0; 8]; 16];
-        let mut which = 0;
-        while which < 16 {
-            let mut n = 0;
-            while n < 8 {
-                pairs[which][n] = 2 * PACKED[which][n / 2] + n as u32 % 2;
-                n += 1;
-            }
-            which += 1;
-        }
-        pairs
-    }
 
     // SAFETY, of all below: this type is only named where the instructions were detected; loads and stores are of arrays as
     // long as a register.
@@ -186,27 +188,42 @@ mod wide {
         }
 
         #[inline(always)]
+        fn either(self, limit: Self, yes: Self, no: Self) -> Self {
+            Self(unsafe { _mm256_blendv_pd(no.0, yes.0, _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, limit.0)) })
+        }
+
+        #[inline(always)]
+        fn from_whole(v: [i32; 4]) -> Self {
+            Self(unsafe { _mm256_cvtepi32_pd(_mm_loadu_si128(v.as_ptr().cast())) })
+        }
+
+        #[inline(always)]
+        fn to_whole(self) -> [i32; 4] {
+            let mut v = [0; 4];
+            unsafe { _mm_storeu_si128(v.as_mut_ptr().cast(), _mm256_cvttpd_epi32(self.0)) };
+            v
+        }
+
+        #[inline(always)]
+        fn put_rising(first: u32, into: &mut [u32; 8]) {
+            const STEPS: [i32; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
+            unsafe {
+                let first = _mm256_set1_epi32(first as i32);
+                let all = _mm256_add_epi32(first, _mm256_loadu_si256(STEPS.as_ptr().cast()));
+                _mm256_storeu_si256(into.as_mut_ptr().cast(), all);
+            }
+        }
+
+        #[inline(always)]
+        fn to_f32(self) -> [f32; 4] {
+            let mut v = [0.0; 4];
+            unsafe { _mm_storeu_ps(v.as_mut_ptr(), _mm256_cvtpd_ps(self.0)) };
+            v
+        }
+
+        #[inline(always)]
         fn picked<const ORDER: i32>(self) -> Self {
             Self(unsafe { _mm256_permute4x64_pd::<ORDER>(self.0) })
-        }
-
-        #[inline(always)]
-        fn put(self, which: u32, into: &mut [f64; 4]) {
-            let order = &PAIRS[(which & 15) as usize];
-            unsafe {
-                let order = _mm256_loadu_si256(order.as_ptr().cast());
-                let packed = _mm256_permutevar8x32_ps(_mm256_castpd_ps(self.0), order);
-                _mm256_storeu_pd(into.as_mut_ptr(), _mm256_castps_pd(packed));
-            }
-        }
-
-        #[inline(always)]
-        fn put_f32(self, which: u32, into: &mut [f32; 4]) {
-            let order = &PACKED[(which & 15) as usize];
-            unsafe {
-                let order = _mm_loadu_si128(order.as_ptr().cast());
-                _mm_storeu_ps(into.as_mut_ptr(), _mm_permutevar_ps(_mm256_cvtpd_ps(self.0), order));
-            }
         }
     }
 }

@@ -21,6 +21,25 @@ pub(crate) fn has_wide() -> bool {
     false
 }
 
+/// Has what will be read soon brought near, where the machine can.
+#[inline(always)]
+pub(crate) fn fetch<T>(of: &T) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let (first, last) = (std::ptr::from_ref(of).cast::<i8>(), size_of::<T>() - 1);
+        #[expect(unsafe_code, reason = "an instruction that has no safe name; it reads nothing")]
+        // SAFETY: every processor of this kind has it, and it is a hint that may be given for any address.
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T0>(first);
+            // Where it lies across two lines of a cache.
+            _mm_prefetch::<_MM_HINT_T0>(first.wrapping_add(last));
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = of;
+}
+
 /// Arithmetic of an array, number by number, by whatever instructions there are.
 macro_rules! plain {
     ($name:ident, $number:ty) => {

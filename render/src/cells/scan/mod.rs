@@ -6,12 +6,17 @@
 //! on a face is that of its plane, or where it has none the mean of its corners': cells that share the face get the same
 //! bits, and each ray passes it in both of them or in neither.
 
+mod outline;
 mod planes;
+mod scanner;
 mod sides;
+#[cfg(test)]
+mod tests;
 
-use crate::simd::{Four, put_from};
-use planes::{Cell, Passed};
-use sides::Sides;
+use crate::simd::Four;
+use planes::Passed;
+use scanner::ROOM;
+pub(super) use scanner::{Cells, Scanner};
 
 /// Pixels that go at once.
 const LANES: usize = 4;
@@ -67,11 +72,13 @@ impl Rect {
         (j - self.low[1]) as usize * self.size()[0] + (i - self.low[0]) as usize
     }
 
+    #[inline(always)]
     pub(super) fn size(&self) -> [usize; 2] {
         [0, 1].map(|a| usize::try_from(self.high[a] - self.low[a]).unwrap_or(0))
     }
 
     /// How many pixels.
+    #[inline(always)]
     pub(super) fn area(&self) -> usize {
         self.size().into_iter().product()
     }
@@ -113,13 +120,6 @@ pub(super) struct Raw {
 /// Corners of a face, and for each the edge across from it.
 const FACES: [([usize; 3], [usize; 3]); 4] =
     [([1, 2, 3], [5, 4, 3]), ([0, 2, 3], [5, 2, 1]), ([0, 1, 3], [4, 2, 0]), ([0, 1, 2], [3, 1, 0])];
-/// What is gathered before it is handed on.
-const GATHERED: usize = 512;
-
-/// Pixels of a row, a multiple of [`LANES`], that are gone through before it is asked whether that is so.
-const AHEAD: usize = 128;
-/// There is room for these, and for a group that is not written whole.
-const ROOM: usize = GATHERED + AHEAD + LANES;
 
 /// What rays have of cells, gathered until there is enough of it: a [`Raw`] each, part by part.
 #[derive(Debug)]
@@ -194,28 +194,20 @@ impl Raws {
         }
     }
 
-    /// Adds what those rays of a group pass that do.
+    /// Adds what the rays of the first pixels of a list, as many as there are lanes, all of which pass, have of a cell.
     #[inline(always)]
-    fn add_all<F: Four>(&mut self, first: u32, passed: &Passed<F>, hit: u32) {
+    fn add_all<F: Four>(&mut self, list: &[u32], lanes: usize, passed: &Passed<F>) {
         let at = self.count.min(ROOM - LANES);
         let [front, back] = passed.depths;
         let [from, to] = passed.values;
-        if let Some(fronts) = self.fronts[at..].first_chunk_mut() {
-            front.put(hit, fronts);
+        put(&mut self.fronts, at, front.to_array());
+        put(&mut self.backs, at, back.to_array());
+        put(&mut self.from, at, from.to_f32());
+        put(&mut self.to, at, to.to_f32());
+        if let Some(pixels) = list.first_chunk() {
+            put(&mut self.pixels, at, *pixels);
         }
-        if let Some(backs) = self.backs[at..].first_chunk_mut() {
-            back.put(hit, backs);
-        }
-        if let Some(values) = self.from[at..].first_chunk_mut() {
-            from.put_f32(hit, values);
-        }
-        if let Some(values) = self.to[at..].first_chunk_mut() {
-            to.put_f32(hit, values);
-        }
-        if let Some(pixels) = self.pixels[at..].first_chunk_mut() {
-            put_from(first, hit, pixels);
-        }
-        self.count = at + hit.count_ones() as usize;
+        self.count = at + lanes;
     }
 
     /// Adds where a ray passes two faces, if it does so before the eye.
@@ -236,6 +228,26 @@ impl Raws {
     }
 }
 
+/// Writes a group into a list.
+#[inline(always)]
+fn put<T>(list: &mut [T; ROOM], at: usize, group: [T; LANES]) {
+    if let Some(into) = list[at..].first_chunk_mut() {
+        *into = group;
+    }
+}
+
+/// A tetrahedron that may show.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
+pub(super) struct Shown {
+    /// Numbers of its corners in its cluster.
+    pub(super) corners: [u16; 4],
+    pub(super) tetrahedron: u32,
+    /// Depth of its nearest corner, or a little less.
+    pub(super) nearest: f32,
+    pub(super) reach: Rect,
+}
+
 /// A tetrahedron: its corners, in the order of their numbers, and its scalar where that is one for all of it.
 pub(super) type Tetrahedron<'a> = ([&'a Corner; 4], Option<f64>);
 
@@ -244,95 +256,4 @@ pub(super) type Tetrahedron<'a> = ([&'a Corner; 4], Option<f64>);
 fn scalars((corners, constant): &Tetrahedron<'_>) -> [f64; 4] {
     let [p, q, r, s] = corners;
     constant.map_or([p.scalar, q.scalar, r.scalar, s.scalar], |value| [value; 4])
-}
-
-/// Finds what the rays of `reach`, which lies within `rect`, have of a tetrahedron. Pixels are counted in `rect`. Whenever
-/// much is gathered it goes to `full`; what is left stays in `raws`.
-#[inline(always)]
-pub(super) fn scan<F: Four>(
-    of: Tetrahedron<'_>,
-    rects: [&Rect; 2],
-    perspective: bool,
-    raws: &mut Raws,
-    full: &mut impl FnMut(Found<'_>),
-) {
-    let of = &of;
-    let Some(cell) = Cell::new::<F>(of, perspective) else {
-        flat(of, rects, perspective, raws, full);
-        return;
-    };
-    match (cell.near, perspective) {
-        (1, false) => plain::<F, 1, false>(&cell, of, rects, raws, full),
-        (2, false) => plain::<F, 2, false>(&cell, of, rects, raws, full),
-        (_, false) => plain::<F, 3, false>(&cell, of, rects, raws, full),
-        (1, true) => plain::<F, 1, true>(&cell, of, rects, raws, full),
-        (2, true) => plain::<F, 2, true>(&cell, of, rects, raws, full),
-        (_, true) => plain::<F, 3, true>(&cell, of, rects, raws, full),
-    }
-}
-
-/// The same of a cell that has planes, `NEAR` of them near.
-#[inline(always)]
-fn plain<F: Four, const NEAR: usize, const PERSPECTIVE: bool>(
-    cell: &Cell,
-    of: &Tetrahedron<'_>,
-    [rect, reach]: [&Rect; 2],
-    raws: &mut Raws,
-    full: &mut impl FnMut(Found<'_>),
-) {
-    let width = rect.high[0] - rect.low[0];
-    for j in reach.low[1]..reach.high[1] {
-        let before = (j - rect.low[1]) * width - rect.low[0];
-        let row = cell.row(j);
-        let mut i = reach.low[0];
-        while i < reach.high[0] {
-            // For as many at once as there is room for.
-            let end = reach.high[0].min(i + AHEAD as i32);
-            while i < end {
-                let lanes = LANES.min((end - i) as usize);
-                let within = (1 << lanes) - 1;
-                let passed = cell.pass::<F, NEAR, PERSPECTIVE>(&row, i);
-                let first = (before + i) as u32;
-                if passed.clear & within == within {
-                    raws.add_all(first, &passed, passed.hit & within);
-                } else {
-                    unsure(of, [i, j], first, lanes, PERSPECTIVE, raws);
-                }
-                i += LANES as i32;
-            }
-            if raws.count >= GATHERED {
-                full(raws.take());
-            }
-        }
-    }
-}
-
-/// A group of rays of which some pass close to an edge.
-#[cold]
-#[inline(never)]
-fn unsure(of: &Tetrahedron<'_>, at: [i32; 2], first: u32, lanes: usize, perspective: bool, raws: &mut Raws) {
-    Sides::new(of, perspective).pass(at, first, lanes, raws);
-}
-
-/// What `scan` finds, of a cell without planes.
-#[inline(never)]
-fn flat(
-    of: &Tetrahedron<'_>,
-    [rect, reach]: [&Rect; 2],
-    perspective: bool,
-    raws: &mut Raws,
-    full: &mut impl FnMut(Found<'_>),
-) {
-    let width = rect.high[0] - rect.low[0];
-    let sides = Sides::new(of, perspective);
-    for j in reach.low[1]..reach.high[1] {
-        let before = (j - rect.low[1]) * width - rect.low[0];
-        for i in (reach.low[0]..reach.high[0]).step_by(LANES) {
-            let lanes = LANES.min((reach.high[0] - i) as usize);
-            sides.pass([i, j], (before + i) as u32, lanes, raws);
-            if raws.count >= GATHERED {
-                full(raws.take());
-            }
-        }
-    }
 }

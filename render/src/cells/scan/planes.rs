@@ -9,6 +9,7 @@
 //! Two planes rank alike along the line of the edge that they share. Where they do so within what rounding may have done to
 //! them, the ray is left to exact predicates (`sides`). So is a cell that is too flat to have such planes.
 
+use super::outline::Outline;
 use super::{Corner, FACES, Tetrahedron, scalars};
 use crate::simd::{Four, PlainFour};
 
@@ -168,6 +169,8 @@ pub(super) struct Cell {
     unsure: f64,
     /// The same between near faces: first and second, first and third, second and third.
     unsure_near: [f64; 3],
+    /// By how much the outline has to be wider: see there.
+    slack: f64,
     /// The scalar of the first corner, and what it changes: at the first pixel, for one to the right, down, and in rank. Where
     /// rays come from one eye the change is to be multiplied by depth.
     from: f64,
@@ -175,9 +178,22 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// None for one that is too flat, that is not wholly before the eye, or that has no sides that could be told.
+    /// Nothing.
+    pub(super) const NONE: Self = Self {
+        a: [0.0; 4],
+        b: [0.0; 4],
+        c: [0.0; 4],
+        near: 0,
+        unsure: 0.0,
+        unsure_near: [0.0; 3],
+        slack: 0.0,
+        from: 0.0,
+        change: [0.0; 4],
+    };
+
+    /// Becomes a tetrahedron; none if that is too flat, not wholly before the eye, or has no sides that could be told.
     #[inline(always)]
-    pub(super) fn new<F: Four>(of: &Tetrahedron<'_>, perspective: bool) -> Option<Self> {
+    pub(super) fn set<F: Four>(&mut self, of: &Tetrahedron<'_>, perspective: bool) -> Option<()> {
         let (corners, scalars) = (&of.0, scalars(of));
         let faces = Faces::<F>::new(corners);
         let [x, y, z] = faces.places.map(F::to_array);
@@ -201,7 +217,10 @@ impl Cell {
         let wrong = wrong.to_array();
         let mut unsure = [(wrong[0] + wrong[1]) + (wrong[2] + wrong[3]); 4];
         let mut planes = faces.planes();
+        let mut slack = 2.0 * unsure[0];
         if planes.known != ALL {
+            // A plane on edge is known too little for lines in the picture.
+            slack = f64::INFINITY;
             let normal = [nx, ny, nz];
             let size = faces.size.map(F::to_array);
             let of = [[x, y, z], normal, size];
@@ -219,40 +238,36 @@ impl Cell {
         let slope = |n: &[f64; 4]| ((one * n[1] - two * n[2]) + three * n[3]) * part;
         let [right, down, back] = [slope(&nx), slope(&ny), slope(&nz)];
         let at_first = -((right * x[0] + down * y[0]) + back * z[0]);
-        let of = |v: &[f64; 4]| [v[order[0]], v[order[1]], v[order[2]], v[order[3]]];
-        Some(Self {
-            a: of(&planes.a),
-            b: of(&planes.b),
-            c: of(&planes.c),
-            near: near.count_ones(),
-            unsure: unsure[order[3]],
-            unsure_near: [pair(0, 1), pair(0, 2), pair(1, 2)],
-            from: scalars[0],
-            change: [at_first, right, down, back],
-        })
-    }
-
-    /// What is one for all pixels of a row of the picture.
-    #[inline(always)]
-    pub(super) fn row(&self, j: i32) -> Row {
-        let y = f64::from(j);
-        let mut ranks = [0.0; 4];
-        for (face, rank) in ranks.iter_mut().enumerate() {
-            *rank = self.c[face] + self.b[face] * y;
+        for (place, from) in order.into_iter().enumerate() {
+            self.a[place] = planes.a[from];
+            self.b[place] = planes.b[from];
+            self.c[place] = planes.c[from];
         }
-        Row { ranks, change: self.change[0] + self.change[2] * y }
+        self.near = near.count_ones();
+        self.unsure = unsure[order[3]];
+        self.unsure_near = [pair(0, 1), pair(0, 2), pair(1, 2)];
+        self.slack = slack;
+        self.from = scalars[0];
+        self.change = [at_first, right, down, back];
+        Some(())
     }
 
-    /// Where the rays of the group from pixel i of a row on pass, `NEAR` of the faces being near.
+    /// Finds its outline.
+    #[inline(always)]
+    pub(super) fn outline<F: Four>(&self, outline: &mut Outline) {
+        outline.set::<F>([&self.a, &self.b, &self.c], self.near, self.slack);
+    }
+
+    /// Where rays pass, `NEAR` of the faces being near.
     #[inline(always)]
     pub(super) fn pass<F: Four, const NEAR: usize, const PERSPECTIVE: bool>(
         &self,
-        row: &Row,
-        i: i32,
+        [x, y]: [F; 2],
     ) -> Passed<F> {
-        let x = F::all(f64::from(i)) + F::from_array([0.0, 1.0, 2.0, 3.0]);
-        let rank = |face: usize| F::all(row.ranks[face]) + F::all(self.a[face]) * x;
-        let ranks = [rank(0), rank(1), rank(2), rank(3)];
+        let mut ranks = [x; 4];
+        for (face, rank) in ranks.iter_mut().enumerate() {
+            *rank = (F::all(self.c[face]) + F::all(self.b[face]) * y) + F::all(self.a[face]) * x;
+        }
         let (mut enter, mut leave) = (ranks[0], ranks[NEAR]);
         for rank in &ranks[1..NEAR] {
             enter = enter.most(*rank);
@@ -275,7 +290,7 @@ impl Cell {
             }
         }
         let none = F::all(0.0);
-        let along = F::all(row.change) + F::all(self.change[1]) * x;
+        let along = (F::all(self.change[0]) + F::all(self.change[2]) * y) + F::all(self.change[1]) * x;
         let depth = |rank: F| if PERSPECTIVE { (none - rank).inverse() } else { rank };
         let value = |rank: F, depth: F| {
             let change = along + F::all(self.change[3]) * rank;
@@ -291,12 +306,6 @@ impl Cell {
 #[inline(always)]
 fn spread(v: [f64; 4]) -> f64 {
     ((v[1] - v[0]).abs() + (v[2] - v[0]).abs()) + (v[3] - v[0]).abs()
-}
-
-/// What is one for all pixels of a row of the picture.
-pub(super) struct Row {
-    ranks: [f64; 4],
-    change: f64,
 }
 
 /// Where the rays of a group pass a cell.

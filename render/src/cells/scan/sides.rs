@@ -13,7 +13,7 @@
 use std::cmp::Ordering;
 
 use super::planes::{Planes, depth};
-use super::{Corner, FACES, LANES, Raws, Tetrahedron, scalars};
+use super::{Corner, FACES, LANES, Raws, Rect, Tetrahedron, scalars};
 
 /// One of each pixel of a group, where no access of memory straddles two lines of a cache.
 #[derive(Debug, Clone, Copy)]
@@ -74,6 +74,17 @@ impl<'a> Sides<'a> {
             [weight, depth, scalars[corner] * weight]
         });
         Self { corners, fields, planes: Planes::new(corners), perspective }
+    }
+
+    /// Adds what the rays of `reach` pass; pixels are counted in `rect`.
+    #[inline(never)]
+    pub(super) fn pass_rect(&self, rect: &Rect, reach: &Rect, raws: &mut Raws) {
+        for j in reach.low[1]..reach.high[1] {
+            for i in (reach.low[0]..reach.high[0]).step_by(LANES) {
+                let lanes = LANES.min((reach.high[0] - i) as usize);
+                self.pass([i, j], rect.number([i, j]) as u32, lanes, raws);
+            }
+        }
     }
 
     /// Adds what the rays of the first `lanes` of a group from pixel (i, j) on pass; `first` is that pixel's number.

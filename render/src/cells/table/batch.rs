@@ -99,7 +99,7 @@ impl Batch {
     fn within<E: Eight>(&mut self, source: &impl Source<E>, of: Stretches<'_>, k: usize) -> u32 {
         let (from, to) = (eight::<E>(of.from, k), eight::<E>(of.to, k));
         let numbers = source.numbers(from);
-        let across = E::differ(numbers, source.numbers(to));
+        let across = source.beyond(numbers, to);
         for half in 0..2 {
             let which = across >> (4 * half) & 15;
             if let Some(into) = self.across[self.count..].first_chunk_mut() {
@@ -112,8 +112,9 @@ impl Batch {
         }
         let means = source.pieces(numbers).means(from, to);
         let (seen, alone) = shade(&means, eight(of.mm, k));
-        let (low, high) = self.seen[k * WIDE..(k + 1) * WIDE].split_at_mut(4);
-        E::put_rows(seen, low, high);
+        if let Some(rows) = self.seen[k * WIDE..].first_chunk_mut() {
+            E::put_rows(seen, rows);
+        }
         alone & !across
     }
 
@@ -132,8 +133,9 @@ impl Batch {
         let (mut seen, mut alone) = shade(&begin.means(from, out), (out - from) * by);
         let apart = into - out;
         let none = E::all(0.0);
-        if none.bits_below(apart * by) != 0 {
-            let (between, rough) = between::<E>(table, first, last, apart * by);
+        let whole = none.bits_below(apart * by);
+        if whole != 0 {
+            let (between, rough) = between::<E>(table, whole, [first, last], apart * by);
             under(&mut seen, between);
             alone |= rough;
         }
@@ -141,8 +143,7 @@ impl Batch {
         under(&mut seen, far);
         alone |= rough;
         let mut rows = [[0.0; 4]; WIDE];
-        let (low, high) = rows.split_at_mut(4);
-        E::put_rows(seen, low, high);
+        E::put_rows(seen, &mut rows);
         let count = (self.count - k * WIDE).min(WIDE);
         for (row, &which) in rows.iter().zip(&which[..count]) {
             self.seen[which as usize] = *row;
@@ -184,21 +185,25 @@ impl Batch {
     }
 }
 
-/// What is seen of whole pieces between others, and of which that does not say enough.
+/// What is seen of the whole pieces that some pass between others, and of which that does not say enough.
 #[inline(always)]
-fn between<E: Eight>(table: &Table, first: E::Numbers, last: E::Numbers, mm: E) -> ([E; 4], u32) {
-    let (first, last) = (E::numbers_to_array(first), E::numbers_to_array(last));
+fn between<E: Eight>(table: &Table, mut which: u32, ends: [E::Numbers; 2], mm: E) -> ([E; 4], u32) {
+    let [first, last] = [E::numbers_to_array(ends[0]), E::numbers_to_array(ends[1])];
     let mut rates = [[0.0; WIDE]; 4];
     let mut varies = [0.0; WIDE];
-    for n in 0..WIDE {
+    while which != 0 {
+        let n = which.trailing_zeros() as usize & (WIDE - 1);
+        which &= which - 1;
         let [low, high] = [first[n].min(last[n]), first[n].max(last[n])].map(|number| number as usize);
-        if low + 1 < high {
-            let whole = table.whole(low + 1, high);
-            for c in 0..4 {
-                rates[c][n] = whole[c];
-            }
-            varies[n] = table.varies(low + 1, high);
+        // Where the scalar stays, nothing lies between whatever the numbers come to.
+        if low + 1 >= high {
+            continue;
         }
+        let whole = table.whole(low + 1, high);
+        for c in 0..4 {
+            rates[c][n] = whole[c];
+        }
+        varies[n] = table.varies(low + 1, high);
     }
     let [r, g, b, tau] = rates.map(E::from_array);
     let none = E::all(0.0);

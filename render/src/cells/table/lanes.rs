@@ -58,6 +58,8 @@ pub(super) struct Means<E> {
 pub(super) trait Source<E: Eight> {
     /// The numbers of the pieces of positions.
     fn numbers(&self, positions: E) -> E::Numbers;
+    /// Which positions do not lie in the pieces of these numbers, a bit each.
+    fn beyond(&self, numbers: E::Numbers, positions: E) -> u32;
     fn pieces(&self, numbers: E::Numbers) -> Pieces<E>;
 }
 
@@ -116,6 +118,11 @@ impl<E: Eight, const REGISTERS: usize> Source<E> for Few<'_, REGISTERS> {
     }
 
     #[inline(always)]
+    fn beyond(&self, numbers: E::Numbers, positions: E) -> u32 {
+        outside(positions, self.of(BEGIN, numbers), self.of(END, numbers))
+    }
+
+    #[inline(always)]
     fn pieces(&self, numbers: E::Numbers) -> Pieces<E> {
         Pieces {
             begin: self.of(BEGIN, numbers),
@@ -135,6 +142,12 @@ impl<E: Eight, const REGISTERS: usize> Source<E> for Few<'_, REGISTERS> {
     }
 }
 
+/// Which positions do not lie from one up to but not at another, a bit each.
+#[inline(always)]
+fn outside<E: Eight>(positions: E, begin: E, end: E) -> u32 {
+    positions.bits_below(begin) | !positions.bits_below(end) & 0xff
+}
+
 impl<'a> Many<'a> {
     pub(super) fn new(table: &'a super::Table) -> Self {
         Self(table)
@@ -145,6 +158,17 @@ impl<E: Eight> Source<E> for Many<'_> {
     #[inline(always)]
     fn numbers(&self, positions: E) -> E::Numbers {
         E::numbers(positions.to_array().map(|position| self.0.piece(position) as u32))
+    }
+
+    #[inline(always)]
+    fn beyond(&self, numbers: E::Numbers, positions: E) -> u32 {
+        let of = |what: usize, number: u32| self.0.lanes.rows[number as usize].0[what / 8][what % 8];
+        let numbers = E::numbers_to_array(numbers);
+        outside(
+            positions,
+            E::from_array(numbers.map(|n| of(BEGIN, n))),
+            E::from_array(numbers.map(|n| of(END, n))),
+        )
     }
 
     #[inline(always)]

@@ -124,10 +124,19 @@ impl Table {
         (value - self.first) * self.per_value
     }
 
+    /// The most that its colours have: red, green, blue.
+    pub(super) fn most(&self) -> [f32; 3] {
+        self.pieces.iter().fold([0.0; 3], |most, piece| {
+            std::array::from_fn(|c| piece.color[c].max(piece.color[c] + piece.turn[c]).max(most[c]))
+        })
+    }
+
     /// Whether nothing absorbs between two values.
     #[inline(always)]
     pub(super) fn is_clear(&self, [low, high]: [f64; 2]) -> bool {
-        self.clear.iter().any(|range| low >= range[0] && high <= range[1])
+        // Without a branch for each: there are few, and which it is cannot be foreseen.
+        let within = |range: &[f64; 2]| u32::from(low >= range[0]) & u32::from(high <= range[1]);
+        self.clear.iter().map(within).sum::<u32>() > 0
     }
 
     /// The piece of a position.

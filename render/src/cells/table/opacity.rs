@@ -1,9 +1,9 @@
 //! What is seen of an optical depth.
 
-use std::ops::{Mul, Sub};
+use std::ops::{Add, Mul, Sub};
 
 /// Optical depth below which series are as good as the exponential.
-pub(super) const THIN: f32 = 0.25;
+pub(super) const THIN: f32 = 0.7;
 
 /// 1 - e^-τ, without loss where τ is small.
 #[inline(always)]
@@ -27,12 +27,17 @@ pub(super) fn thick(tau: f32) -> [f32; 3] {
 
 /// The [`shares`] of a small τ, 0 or more. One number or several at once; `all` makes the same one of all.
 #[inline(always)]
-pub(super) fn thin<N: Copy + Sub<Output = N> + Mul<Output = N>>(tau: N, all: impl Fn(f32) -> N) -> [N; 3] {
-    let rest = all(1.0 / 24.0) - tau * (all(1.0 / 120.0) - tau * all(1.0 / 720.0));
-    let part = all(1.0) - tau * (all(1.0 / 2.0) - tau * (all(1.0 / 6.0) - tau * rest));
-    let rest = all(1.0 / 24.0) - tau * (all(1.0 / 80.0) - tau * all(1.0 / 360.0));
-    let lag = tau * tau * (tau * rest - all(1.0 / 12.0));
-    [part, lag, tau * part]
+pub(super) fn thin<N>(tau: N, all: impl Fn(f32) -> N) -> [N; 3]
+where
+    N: Copy + Add<Output = N> + Sub<Output = N> + Mul<Output = N>,
+{
+    let square = tau * tau;
+    let rest =
+        (all(1.0 / 6.0) - tau * all(1.0 / 24.0)) + square * (all(1.0 / 120.0) - tau * all(1.0 / 720.0));
+    let part = (all(1.0) - tau * all(0.5)) + square * rest;
+    let rest =
+        (tau * all(1.0 / 24.0) - all(1.0 / 12.0)) - square * (all(1.0 / 80.0) - tau * all(1.0 / 360.0));
+    [part, square * rest, tau * part]
 }
 
 /// e^-τ for τ ≥ 0, by arithmetic alone: several go at once.

@@ -62,8 +62,15 @@ pub(super) fn run(
         let camera = scenes::camera(&item.grid, true, size);
         let scene = folder.path().join("scene.json");
         write_file(&scene, scene_of(item, &camera, &grid).to_string().as_bytes())?;
-        // To the end of each ray, and with early termination as the program has it and as in the paper.
-        let ours = [("exact", None), ("to 1/512", Some(Early::default())), ("to 1/10", Some(EARLY))];
+        // To the end of each ray, and with early termination: as the program has it, to less than a step of 8 bits, and as in
+        // the paper.
+        let step = Early { threshold: 1.0 - 1.0 / 128.0, ..Early::default() };
+        let ours = [
+            ("exact", None),
+            ("to 1/512", Some(Early::default())),
+            ("to 1/256", Some(step)),
+            ("to 1/20", Some(EARLY)),
+        ];
         let ours = ours.into_iter().map(|(name, early)| {
             Entry::new(format!("ours, {name}"), Way::Ours(Options { early, ..Options::default() }), size)
         });

@@ -1,0 +1,67 @@
+//! The outline of a cell in the picture: which pixels of a row its rays may pass.
+//!
+//! A ray passes where all planes of near faces rank below all those of far ones. Each such pair of planes ranks alike along the
+//! line of the edge that it shares, an edge of the outline, which rows cross at places that run linearly from row to row.
+
+use crate::simd::Four;
+
+/// By how many faces are near, which are paired, near and far, with the near ones first; where there are but three pairs one
+/// of them twice.
+const PAIRS: [[[usize; 4]; 2]; 4] =
+    [[[0; 4]; 2], [[0, 0, 0, 0], [1, 2, 3, 3]], [[0, 0, 1, 1], [2, 3, 2, 3]], [[0, 1, 2, 2], [3, 3, 3, 3]]];
+/// A little less than to the next column.
+const NEXT: f64 = 1.0 - 1e-9;
+
+/// Columns that bound a cell to the left and to the right, by the lines of its edges: on the row of pixels 0, and how much more
+/// on each row further down. Without end where a line does not bound it to that side.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Outline {
+    left: [[f64; 4]; 2],
+    right: [[f64; 4]; 2],
+}
+
+impl Outline {
+    /// Nothing.
+    pub(super) const NONE: Self = Self { left: [[0.0; 4]; 2], right: [[0.0; 4]; 2] };
+
+    /// Of planes, rank at (i, j) being (c + b·j) + a·i, of which `near` are near and come first. All rays whose ranks are apart
+    /// by more than minus half of `slack`, the other half being left for what rounding does here.
+    #[inline(always)]
+    pub(super) fn set<F: Four>(&mut self, [a, b, c]: [&[f64; 4]; 3], near: u32, slack: f64) {
+        let pairs = &PAIRS[near as usize & 3];
+        let (a, b) = (apart::<F>(a, pairs), apart::<F>(b, pairs));
+        let c = apart::<F>(c, pairs) + F::all(slack);
+        let none = F::all(0.0);
+        let part = (none - a).inverse();
+        let (first, step) = (c * part, b * part);
+        // What is no number bounds nothing either: see `columns`.
+        self.left = [
+            none.either(a, first, F::all(f64::NEG_INFINITY)).to_array(),
+            none.either(a, step, none).to_array(),
+        ];
+        self.right =
+            [a.either(none, first, F::all(f64::INFINITY)).to_array(), a.either(none, step, none).to_array()];
+    }
+
+    /// Of four rows: the first column of each, and the one behind its last. Columns are those from `low` up to but not at
+    /// `high`, which are not negative; rows below `last` have none.
+    #[inline(always)]
+    pub(super) fn columns<F: Four>(&self, rows: F, last: i32, [low, high]: [i32; 2]) -> [[i32; 4]; 2] {
+        let (mut left, mut right) = (F::all(f64::from(low)), F::all(f64::from(high - 1)));
+        for edge in 0..4 {
+            left = (F::all(self.left[0][edge]) + F::all(self.left[1][edge]) * rows).most(left);
+            right = (F::all(self.right[0][edge]) + F::all(self.right[1][edge]) * rows).least(right);
+        }
+        // Within what whole numbers there are.
+        (left, right) = (left.least(F::all(f64::from(high))), right.most(F::all(f64::from(low - 1))));
+        right = F::all(f64::from(last)).either(rows, F::all(f64::from(low - 1)), right);
+        [(left + F::all(NEXT)).to_whole(), (right + F::all(1.0)).to_whole()]
+    }
+}
+
+/// By how much the far plane of each pair has more than the near one.
+#[inline(always)]
+fn apart<F: Four>(v: &[f64; 4], [near, far]: &[[usize; 4]; 2]) -> F {
+    F::from_array([v[far[0]], v[far[1]], v[far[2]], v[far[3]]])
+        - F::from_array([v[near[0]], v[near[1]], v[near[2]], v[near[3]]])
+}
