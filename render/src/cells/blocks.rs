@@ -12,7 +12,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use rayon::prelude::*;
 
 use super::CellsError;
-use super::early::Ending;
+use super::early::{Early, Ending};
 use super::fold::{Segment, composite};
 use super::in_view::{Chosen, InView};
 use super::lists::Log;
@@ -129,26 +129,28 @@ impl<'a> Desk<'a> {
             } else {
                 projector.draw(frame, of.view(frame, scratch, counts), rect, &mut sink, counts);
                 if let Some(ending) = &mut sink.ending {
-                    ending.table.refresh();
+                    ending.refresh();
                 }
             }
             if !goes_on() {
                 return None;
             }
         }
+        let Drawing { log, ending } = sink;
         log.close();
-        Some(rows.iter_mut().enumerate().map(|(y, row)| self.composite(y * width, row)).collect())
+        let lacking = manner.early.filter(|_| ending.is_some_and(|ending| ending.lacks()));
+        Some(rows.iter_mut().enumerate().map(|(y, row)| self.composite(y * width, row, lacking)).collect())
     }
 
-    /// Composites the pixels of a row of a block, which begins with `first`.
-    fn composite(&mut self, first: usize, row: &mut [[f32; 4]]) -> RowSegments {
+    /// Composites the pixels of a row of a block, which begins with `first`; with `lacking` something was left out of the block.
+    fn composite(&mut self, first: usize, row: &mut [[f32; 4]], lacking: Option<Early>) -> RowSegments {
         let mut kept = RowSegments::default();
         for (pixel, color) in (first..).zip(row) {
             self.list.clear();
             self.list.extend_from_slice(self.log.pixel(pixel));
             let kept = self.manner.keep.then_some(&mut kept);
             *color = composite(&mut self.list, kept, &mut self.counts);
-            if let Some(early) = &self.manner.early {
+            if let Some(early) = lacking {
                 early.complete(color, self.most);
             }
         }
@@ -168,8 +170,8 @@ impl Sink for Drawing<'_> {
         self.ending.is_some()
     }
 
-    fn hides(&self, rect: &Rect, nearest: f64) -> bool {
-        self.ending.as_ref().is_some_and(|ending| ending.table.hides(rect, nearest))
+    fn hides(&mut self, rect: &Rect, nearest: f64) -> bool {
+        self.ending.as_mut().is_some_and(|ending| ending.hides(rect, nearest))
     }
 
     fn renews(&self) -> bool {

@@ -34,7 +34,8 @@ impl Early {
 }
 
 impl Early {
-    /// Adds half of what may lie behind a pixel that is terminated, `most` being the most that a colour has there.
+    /// Adds half of what may lie behind a pixel that something may have been left out of, if that is terminated; `most` is the
+    /// most that a colour has there. It is no segment: these do not add up to it.
     #[inline]
     pub(super) fn complete(&self, color: &mut [f32; 4], most: [f32; 3]) {
         // What made its opacity known was put together in another order: rounding must not leave a pixel out.
@@ -166,18 +167,36 @@ impl Table {
 #[derive(Debug)]
 pub(super) struct Ending {
     threshold: f32,
-    pub(super) table: Table,
+    table: Table,
     /// What comes through all that is known of each pixel, and how deep that reaches.
     known: Vec<(f32, f64)>,
     /// The least that comes through of any.
     least: f32,
+    lacks: bool,
 }
 
 impl Ending {
     /// Of subscreens of `side` pixels.
     pub(super) fn new(rect: &Rect, side: usize, threshold: f64) -> Self {
         let known = vec![(1.0, 0.0); rect.area()];
-        Self { threshold: threshold as f32, table: Table::new(rect, side), known, least: 1.0 }
+        Self { threshold: threshold as f32, table: Table::new(rect, side), known, least: 1.0, lacks: false }
+    }
+
+    /// Whether nothing of a rectangle that lies behind a depth can be seen; then it is left out.
+    pub(super) fn hides(&mut self, rect: &Rect, nearest: f64) -> bool {
+        let hides = self.table.hides(rect, nearest);
+        self.lacks |= hides;
+        hides
+    }
+
+    /// Whether something was left out.
+    pub(super) fn lacks(&self) -> bool {
+        self.lacks
+    }
+
+    /// Brings the table up to date.
+    pub(super) fn refresh(&mut self) {
+        self.table.refresh();
     }
 
     /// Takes in a run of a pixel.

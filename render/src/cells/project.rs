@@ -121,8 +121,8 @@ pub(super) trait Sink {
         false
     }
 
-    /// Whether nothing of a rectangle that lies behind a depth can be seen.
-    fn hides(&self, _: &Rect, _: f64) -> bool {
+    /// Whether nothing of a rectangle that lies behind a depth can be seen; then it is left out.
+    fn hides(&mut self, _: &Rect, _: f64) -> bool {
         false
     }
 

@@ -89,7 +89,7 @@ impl Sink for Terminated<'_> {
         true
     }
 
-    fn hides(&self, rect: &Rect, nearest: f64) -> bool {
+    fn hides(&mut self, rect: &Rect, nearest: f64) -> bool {
         self.table.hides(rect, nearest)
     }
 
