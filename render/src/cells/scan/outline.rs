@@ -24,13 +24,13 @@ impl Outline {
     /// Nothing.
     pub(super) const NONE: Self = Self { left: [[0.0; 4]; 2], right: [[0.0; 4]; 2] };
 
-    /// Of planes, rank at (i, j) being (c + b·j) + a·i, of which `near` are near and come first. All rays whose ranks are apart
-    /// by more than minus half of `slack`, the other half being left for what rounding does here.
+    /// Of planes, rank at (i, j) being (c + b·j) + a·i, of which `near` are near and come first. All rays along which the ranks of
+    /// two are apart by more than minus half of both their `slack`, the other half being left for what rounding does here.
     #[inline(always)]
-    pub(super) fn set<F: Four>(&mut self, [a, b, c]: [&[f64; 4]; 3], near: u32, slack: f64) {
+    pub(super) fn set<F: Four>(&mut self, [a, b, c]: [&[f64; 4]; 3], near: u32, slack: &[f64; 4]) {
         let pairs = &PAIRS[near as usize & 3];
         let (a, b) = (apart::<F>(a, pairs), apart::<F>(b, pairs));
-        let c = apart::<F>(c, pairs) + F::all(slack);
+        let c = apart::<F>(c, pairs) + (picked::<F>(slack, &pairs[0]) + picked(slack, &pairs[1]));
         let none = F::all(0.0);
         let part = (none - a).inverse();
         let (first, step) = (c * part, b * part);
@@ -62,6 +62,10 @@ impl Outline {
 /// By how much the far plane of each pair has more than the near one.
 #[inline(always)]
 fn apart<F: Four>(v: &[f64; 4], [near, far]: &[[usize; 4]; 2]) -> F {
-    F::from_array([v[far[0]], v[far[1]], v[far[2]], v[far[3]]])
-        - F::from_array([v[near[0]], v[near[1]], v[near[2]], v[near[3]]])
+    picked::<F>(v, far) - picked(v, near)
+}
+
+#[inline(always)]
+fn picked<F: Four>(v: &[f64; 4], of: &[usize; 4]) -> F {
+    F::from_array([v[of[0]], v[of[1]], v[of[2]], v[of[3]]])
 }

@@ -169,8 +169,8 @@ pub(super) struct Cell {
     unsure: f64,
     /// The same between near faces: first and second, first and third, second and third.
     unsure_near: [f64; 3],
-    /// By how much the outline has to be wider: see there.
-    slack: f64,
+    /// What the outline has to allow for each plane: see there.
+    slack: [f64; 4],
     /// The scalar of the first corner, and what it changes: at the first pixel, for one to the right, down, and in rank. Where
     /// rays come from one eye the change is to be multiplied by depth.
     from: f64,
@@ -186,7 +186,7 @@ impl Cell {
         near: 0,
         unsure: 0.0,
         unsure_near: [0.0; 3],
-        slack: 0.0,
+        slack: [0.0; 4],
         from: 0.0,
         change: [0.0; 4],
     };
@@ -217,10 +217,7 @@ impl Cell {
         let wrong = wrong.to_array();
         let mut unsure = [(wrong[0] + wrong[1]) + (wrong[2] + wrong[3]); 4];
         let mut planes = faces.planes();
-        let mut slack = 2.0 * unsure[0];
         if planes.known != ALL {
-            // A plane on edge is known too little for lines in the picture.
-            slack = f64::INFINITY;
             let normal = [nx, ny, nz];
             let size = faces.size.map(F::to_array);
             let of = [[x, y, z], normal, size];
@@ -242,11 +239,11 @@ impl Cell {
             self.a[place] = planes.a[from];
             self.b[place] = planes.b[from];
             self.c[place] = planes.c[from];
+            self.slack[place] = 2.0 * unsure[from];
         }
         self.near = near.count_ones();
         self.unsure = unsure[order[3]];
         self.unsure_near = [pair(0, 1), pair(0, 2), pair(1, 2)];
-        self.slack = slack;
         self.from = scalars[0];
         self.change = [at_first, right, down, back];
         Some(())
@@ -255,7 +252,7 @@ impl Cell {
     /// Finds its outline.
     #[inline(always)]
     pub(super) fn outline<F: Four>(&self, outline: &mut Outline) {
-        outline.set::<F>([&self.a, &self.b, &self.c], self.near, self.slack);
+        outline.set::<F>([&self.a, &self.b, &self.c], self.near, &self.slack);
     }
 
     /// Where rays pass, `NEAR` of the faces being near.
