@@ -176,6 +176,24 @@ fn sheets_at_one_place_composite_in_their_order() {
     });
 }
 
+/// A triangle whose corners are one point, or two, or three on a line, shows nothing, in the middle of a pixel too.
+#[test]
+fn triangles_without_an_area_show_nothing() {
+    each("no area", 40, |random| {
+        let mut scene = cube(1, 0.0, vec![point(0.0, 0.0)], 1.0);
+        scene.volumes.clear();
+        let mut middle = || random.one(&[-4.5, -1.5, 1.5, 4.5]) + random.one(&[0.0, 0.0, 1e-3]);
+        let (x, z) = (middle(), middle());
+        let first = Point::new(x, random.between(-5.0, 5.0), z);
+        let along = random.one(&[Vector::x(), Vector::z(), Vector::new(1.0, 0.0, -1.0)]) * 3.0;
+        let positions = vec![first, first + along, first + along * 2.0];
+        let triangles = vec![[0, 0, 0], [0, 1, 1], [1, 0, 1], [2, 2, 0], [0, 1, 2], [2, 0, 1], [1, 0, 2]];
+        scene.meshes.push(shapes::item(random, positions, triangles));
+        scene.meshes[0].pose = Affine::identity();
+        known(&scene, 0.5, &plain([0.0; 3], 0.0, [4, 4]), 0.0)
+    });
+}
+
 /// 16 sheets that cross in a line, each seen by every pixel, in a homogeneous volume.
 #[test]
 fn sixteen_sheets_in_a_volume_composite_at_their_depth() {
