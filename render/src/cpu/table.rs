@@ -2,6 +2,7 @@
 //!
 //! Sums are kept in `f64`, so that their differences keep their digits however near two places are.
 
+use crate::scene::light;
 use crate::transfer::{self, Part, Parts};
 use crate::volume::{Grid, Transfer};
 
@@ -100,7 +101,7 @@ impl Table {
             Some(i) if i + 1 < points.len() => position(points[i + 1].value),
             _ => f64::INFINITY,
         };
-        let span = points[points.len() - 1].value - points[0].value;
+        let span = light::value_span(transfer, grid.range());
         Self {
             nodes,
             cut,
@@ -109,7 +110,7 @@ impl Table {
             // The table's own rounding stays on the safe side.
             clear_below: clear_below as f32 - 1.0,
             clear_above: clear_above as f32 + 1.0,
-            flat: (crate::scene::light::FLAT * span / table.step) as f32,
+            flat: (light::FLAT * span / table.step) as f32,
         }
     }
 
