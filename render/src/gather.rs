@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::cpu::Skips;
 use crate::gpu::{Caps, Gpu, GpuError};
 use crate::passes::slabs::{GpuTable, Kind, MAX_GAPS, Member, Proxy, Shown, Spacing, TableCache, gpu_data};
-use crate::scene::{Scene, Shading, VolumeItem, VolumeMode};
+use crate::scene::{Scene, Shading, VolumeItem, VolumeMode, light};
 use crate::texture::{Plan, Reading, TextureCache, VolumeTexture};
 use crate::view::{Form, View};
 use crate::volume::convex::{ConvexSolid, HalfSpace};
@@ -23,6 +23,8 @@ struct Fragment {
     /// The faces, inwards, of prisms whose outside is kept.
     blocks: Vec<[HalfSpace; 5]>,
     transfer: Arc<Transfer>,
+    /// See [`light::value_span`].
+    value_span: f64,
     table: Arc<GpuTable>,
 }
 
@@ -249,6 +251,7 @@ impl Gathered {
             });
             self.members.push(Member { proxy, volume: Some((index, kind, position)), shown });
             let transfer = Arc::clone(&item.transfer);
+            let value_span = light::value_span(&transfer, range);
             self.fragments.push(Fragment {
                 texture,
                 view_from_voxel,
@@ -257,6 +260,7 @@ impl Gathered {
                 rounds,
                 blocks,
                 transfer,
+                value_span,
                 table: Arc::clone(&table),
             });
         }
@@ -326,13 +330,11 @@ impl Gathered {
                 }
             }));
             let (table, texture) = (&fragment.table, &fragment.texture);
-            let points = fragment.transfer.points();
-            let span = points[points.len() - 1].value - points[0].value;
-            let span = if span > 0.0 { span } else { 1.0 };
             let gradient = |axis: usize| {
                 let mut along = Vector::zeros();
                 along[axis] = 1.0;
-                let g = fragment.view_from_voxel.normal(&along) * (texture.value_scale / (2.0 * span));
+                let g = fragment.view_from_voxel.normal(&along)
+                    * (texture.value_scale / (2.0 * fragment.value_span));
                 let step = texture.texture_from_voxel.matrix()[(axis, axis)];
                 [g.x as f32, g.y as f32, g.z as f32, step as f32]
             };

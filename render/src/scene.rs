@@ -20,6 +20,8 @@ pub enum Shading {
 
 /// The one light: white, at the eye, so that half vector, light and view direction are one.
 pub mod light {
+    use crate::volume::Transfer;
+
     /// Part of the colour that needs no light.
     pub const AMBIENT: f64 = 0.3;
     /// Part that goes with |n·v|.
@@ -28,9 +30,20 @@ pub mod light {
     pub const SPECULAR: f64 = 0.2;
     /// Exponent of the highlight.
     pub const SHININESS: f64 = 20.0;
-    /// Gradients below this part of the transfer function's value span per mm do not light: the colour
-    /// stays plain there, so that noise in flat regions makes no pattern.
+    /// Gradients below this part of [`value_span`] per mm do not light: the colour stays plain there, so
+    /// that noise in flat regions makes no pattern.
     pub const FLAT: f64 = 1e-3;
+
+    /// What a volume's gradients are measured by, in the unit of its values.
+    ///
+    /// The span of the transfer function's control points; where all are at one value, that of the volume's
+    /// values, `range` from least to greatest. Infinite where the volume has but one value too: what differs
+    /// there is rounding, and nothing lights.
+    pub fn value_span(transfer: &Transfer, range: [f64; 2]) -> f64 {
+        let points = transfer.points();
+        let spans = [points[points.len() - 1].value - points[0].value, range[1] - range[0]];
+        spans.into_iter().find(|&span| span > 0.0).unwrap_or(f64::INFINITY)
+    }
 }
 
 /// How a volume's samples are kept for drawing.

@@ -114,6 +114,48 @@ fn a_jump_at_the_very_value_belongs_to_its_later_point() {
     });
 }
 
+/// Along each ray the scalar stays what it is; from pixel to pixel it rises slowly, across a control point. No pixel has just
+/// that point's value, beside which single precision may be on either side of a peak.
+#[test]
+fn a_scalar_that_stays_is_what_the_function_says_beside_a_control_point_too() {
+    each("a scalar that stays", 40, |random| {
+        let [low, high] = [random.between(-1000.0, 0.0), random.between(1.0, 2000.0)].map(|v| v as f32);
+        let samples = Samples::F32(vec![low, high]);
+        let (low, span) = (f64::from(low), f64::from(high) - f64::from(low));
+        let mut points = Vec::new();
+        let mut value = low - random.between(-0.3, 0.3) * span;
+        for _ in 0..=random.below(6) {
+            let opacity = random.one(&[0.0, 1.0, 1.0, 0.8, 0.02]);
+            let rgba = [random.part(), random.part(), random.part(), opacity];
+            points.push(ControlPoint { value, rgba });
+            value += random.power(-3.0, 0.0) * span;
+        }
+        let unit_mm = 16.0 * random.power(-1.0, 1.0);
+        let middle = ((points[random.below(points.len())].value - low) / span).clamp(0.01, 0.99);
+        let mut scene = cube(1, 0.0, points, unit_mm);
+        let sides = [8.0, 16.0, 16.0];
+        let [x, y, z] = [0, 1, 2].map(|axis| Vector::ith(axis, sides[axis]));
+        let place = Affine::from_columns(x, y, z, Point::new(-4.0, 0.0, 0.0)).expect("three axes");
+        let grid = Grid::new([2, 1, 1], samples, Rescale::default(), place).expect("two samples");
+        scene.volumes[0].grid = Arc::new(grid);
+        let (size, across) = ([512, 1], 0.01);
+        let offset = Vector::x() * (8.0 * middle - 4.0);
+        scene.camera.eye += offset;
+        scene.camera.target += offset;
+        scene.camera.projection = Projection::Parallel { height_mm: 8.0 * across / f64::from(size[0]) };
+        let transfer = Arc::clone(&scene.volumes[0].transfer);
+        let pixel = |i: u32| {
+            let part = middle + ((f64::from(i) + 0.5) / f64::from(size[0]) - 0.5) * across;
+            let ([r, g, b], tau) = transfer.classify(low + span * part);
+            let alpha = -(-16.0 * tau).exp_m1();
+            [r * alpha, g * alpha, b * alpha, alpha].map(|v| v as f32)
+        };
+        let exact = FloatImage { width: size[0], height: 1, pixels: (0..size[0]).map(pixel).collect() };
+        same(&truth(&scene, size)?, &exact, 0.01).map_err(|e| format!("reference: {e}"))?;
+        same(&(drawers::processor().draw)(&scene, size, 0.125)?, &exact, 1.0)
+    });
+}
+
 /// Surfaces at one place are crossed in the order of the scene's meshes.
 #[test]
 fn sheets_at_one_place_composite_in_their_order() {
@@ -131,6 +173,24 @@ fn sheets_at_one_place_composite_in_their_order() {
             scene.meshes.push(item);
         }
         known(&scene, 0.5, &plain(color, 1.0 - through, [4, 4]), 0.25)
+    });
+}
+
+/// A triangle whose corners are one point, or two, or three on a line, shows nothing, in the middle of a pixel too.
+#[test]
+fn triangles_without_an_area_show_nothing() {
+    each("no area", 40, |random| {
+        let mut scene = cube(1, 0.0, vec![point(0.0, 0.0)], 1.0);
+        scene.volumes.clear();
+        let mut middle = || random.one(&[-4.5, -1.5, 1.5, 4.5]) + random.one(&[0.0, 0.0, 1e-3]);
+        let (x, z) = (middle(), middle());
+        let first = Point::new(x, random.between(-5.0, 5.0), z);
+        let along = random.one(&[Vector::x(), Vector::z(), Vector::new(1.0, 0.0, -1.0)]) * 3.0;
+        let positions = vec![first, first + along, first + along * 2.0];
+        let triangles = vec![[0, 0, 0], [0, 1, 1], [1, 0, 1], [2, 2, 0], [0, 1, 2], [2, 0, 1], [1, 0, 2]];
+        scene.meshes.push(shapes::item(random, positions, triangles));
+        scene.meshes[0].pose = Affine::identity();
+        known(&scene, 0.5, &plain([0.0; 3], 0.0, [4, 4]), 0.0)
     });
 }
 

@@ -1,7 +1,9 @@
 //! Random scenes, drawn by every renderer beside the reference.
 
+use std::sync::Arc;
+
 use render::scene::{Scene, Shading};
-use render::volume::{Affine, Cutter, Side, Vector};
+use render::volume::{Affine, Cutter, Side, Transfer, Vector};
 
 use super::cases::{self, Case, Contents};
 use super::drawers::{self, Drawer};
@@ -127,6 +129,26 @@ fn lit_volumes_cut_and_with_surfaces_in_them() {
         let mut case = cases::any(random, Contents { volumes: 2, cut: true, meshes: 1 });
         for volume in &mut case.scene.volumes {
             volume.shading = Shading::Lit;
+        }
+        check(random, &case)
+    });
+}
+
+/// A function whose control points are all at one value has no span that gradients could be measured by.
+#[test]
+fn lit_volumes_of_a_function_that_only_jumps() {
+    each("lit jumps", 60, |random| {
+        let mut case = cases::any(random, Contents { volumes: 1, cut: false, meshes: 0 });
+        for volume in &mut case.scene.volumes {
+            volume.shading = Shading::Lit;
+            let [low, high] = volume.grid.range();
+            let span = if high > low { high - low } else { low.abs().max(1.0) };
+            let value = low + span * random.between(-0.2, 1.2);
+            let mut points = volume.transfer.points().to_vec();
+            for point in &mut points {
+                point.value = value;
+            }
+            volume.transfer = Arc::new(Transfer::new(points, volume.transfer.unit_mm()).expect("one value"));
         }
         check(random, &case)
     });

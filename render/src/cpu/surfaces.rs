@@ -76,7 +76,9 @@ impl Surfaces {
                 let at = corners.map(|v| pixels[v as usize]);
                 let corners = corners.map(|v| placed[v as usize]);
                 order += 1;
-                if item.opacity == 0.0 || corners.iter().all(|c| c.z < 0.0) {
+                // A point is on no side of its edges: every ray near it would pass it.
+                let is_point = corners[0] == corners[1] && corners[1] == corners[2];
+                if item.opacity == 0.0 || is_point || corners.iter().all(|c| c.z < 0.0) {
                     continue;
                 }
                 let span = |axis: usize, size: u32| {

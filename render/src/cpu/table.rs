@@ -2,6 +2,7 @@
 //!
 //! Sums are kept in `f64`, so that their differences keep their digits however near two places are.
 
+use crate::scene::light;
 use crate::transfer::{self, Part, Parts};
 use crate::volume::{Grid, Transfer};
 
@@ -18,15 +19,35 @@ pub(super) struct Node {
     /// Antiderivative at the node.
     pub(super) sum: [f64; 4],
     pub(super) from: [f32; 4],
-    /// Half of the rise to the next node; not a number where there are jumps before that.
+    /// Half of the rise to the next node. Where extinction jumps or bends before that, the last is not a number, and
+    /// the first the position among those nodes.
     pub(super) half_rise: [f32; 4],
 }
 
-/// A node within which extinction jumps.
-#[derive(Debug)]
-struct Jumps {
-    node: usize,
-    parts: Vec<Part>,
+/// A part of a node within which extinction jumps or bends.
+#[derive(Debug, Clone, Copy)]
+struct Inner {
+    /// 0 to 1 of the node.
+    begin: f64,
+    /// Antiderivative from the node to there.
+    sum: [f64; 4],
+    /// Extinction there, and half of what it rises by over a whole node.
+    from: [f64; 4],
+    half_rise: [f64; 4],
+}
+
+/// The parts of a node, by rising begin.
+fn inner(parts: &[Part]) -> Vec<Inner> {
+    let (mut begin, mut sum) = (0.0, [0.0; 4]);
+    let mut made = Vec::with_capacity(parts.len());
+    for Part { end, ends: [a, b] } in parts {
+        let width = end - begin;
+        let half_rise = std::array::from_fn(|c| 0.5 * (b[c] - a[c]) / width);
+        made.push(Inner { begin, sum, from: *a, half_rise });
+        sum = std::array::from_fn(|c| sum[c] + 0.5 * (a[c] + b[c]) * width);
+        begin = *end;
+    }
+    made
 }
 
 /// A transfer function over the values of a grid; a *position* is a place in the table.
@@ -35,8 +56,8 @@ struct Jumps {
 #[derive(Debug)]
 pub(super) struct Table {
     nodes: Vec<Node>,
-    /// By node; most functions have none. Such a node's `half_rise` is not a number.
-    jumps: Vec<Jumps>,
+    /// The parts of each of the few nodes within which extinction jumps or bends.
+    cut: Vec<Vec<Inner>>,
     /// Position of a stored number v: v·scale + offset.
     pub(super) scale: f32,
     pub(super) offset: f32,
@@ -50,21 +71,21 @@ pub(super) struct Table {
 impl Table {
     pub(super) fn new(transfer: &Transfer, grid: &Grid) -> Self {
         let table = transfer::Table::new(transfer, grid.range(), NODES);
-        let mut jumps: Vec<Jumps> = Vec::new();
+        let mut cut: Vec<Vec<Inner>> = Vec::new();
         let mut nodes = Vec::with_capacity(table.nodes.len());
-        for (node, transfer::Node { sum, parts }) in table.nodes.iter().enumerate() {
-            let ends = match parts {
-                Parts::Whole(ends) => *ends,
-                Parts::Jumps(parts) => {
-                    jumps.push(Jumps { node, parts: parts.clone() });
-                    [parts[0].ends[0], [f64::NAN; 4]]
+        for transfer::Node { sum, parts } in &table.nodes {
+            let (from, half_rise) = match parts {
+                Parts::Whole([from, to]) => {
+                    let rises = [0, 1, 2, 3].map(|c: usize| (0.5 * (to[c] - from[c])) as f32);
+                    // None where both are infinite.
+                    (from, rises.map(|rise| if rise.is_nan() { 0.0 } else { rise }))
+                }
+                Parts::Bends(parts) | Parts::Jumps(parts) => {
+                    cut.push(inner(parts));
+                    (&parts[0].ends[0], [(cut.len() - 1) as f32, 0.0, 0.0, f32::NAN])
                 }
             };
-            nodes.push(Node {
-                sum: *sum,
-                from: ends[0].map(|v| v as f32),
-                half_rise: std::array::from_fn(|c| (0.5 * (ends[1][c] - ends[0][c])) as f32),
-            });
+            nodes.push(Node { sum: *sum, from: from.map(|v| v as f32), half_rise });
         }
         let points = transfer.points();
         let rescale = grid.rescale();
@@ -80,16 +101,16 @@ impl Table {
             Some(i) if i + 1 < points.len() => position(points[i + 1].value),
             _ => f64::INFINITY,
         };
-        let span = points[points.len() - 1].value - points[0].value;
+        let span = light::value_span(transfer, grid.range());
         Self {
             nodes,
-            jumps,
+            cut,
             scale: (rescale.slope / table.step) as f32,
             offset: position(rescale.intercept) as f32,
             // The table's own rounding stays on the safe side.
             clear_below: clear_below as f32 - 1.0,
             clear_above: clear_above as f32 + 1.0,
-            flat: (crate::scene::light::FLAT * span / table.step) as f32,
+            flat: (light::FLAT * span / table.step) as f32,
         }
     }
 
@@ -106,42 +127,34 @@ impl Table {
     }
 
     #[inline(always)]
-    fn node(&self, position: f32) -> (&Node, usize, f32) {
+    fn node(&self, position: f32) -> (&Node, f32) {
         let i = (position.max(0.0) as usize).min(self.nodes.len() - 1);
-        (&self.nodes[i], i, position - i as f32)
+        (&self.nodes[i], position - i as f32)
     }
 
-    /// The antiderivative from the begin of a node in which there are jumps, and extinction there. Before the first node,
-    /// `part` is negative: its first part goes on without end.
+    /// The antiderivative from the begin of a node within which extinction jumps or bends, and extinction there. Before the
+    /// first node, `part` is negative: its first part goes on without end.
     #[cold]
-    fn among_jumps(&self, node: usize, part: f32) -> ([f64; 4], [f64; 4]) {
-        let (mut sum, mut rate, mut begin) = ([0.0; 4], [0.0; 4], 0.0);
+    fn within(&self, node: &Node, part: f32) -> ([f64; 4], [f64; 4]) {
         let part = f64::from(part);
-        let known = self.jumps.iter().find(|j| j.node == node);
-        for Part { end, ends: [a, b] } in known.into_iter().flat_map(|j| &j.parts) {
-            let width = end - begin;
-            let inside = part.min(*end) - begin;
-            let share = inside / width;
-            for c in 0..4 {
-                let here = a[c] + (b[c] - a[c]) * share;
-                sum[c] += 0.5 * (a[c] + here) * inside;
-                rate[c] = here;
-            }
-            if part < *end {
-                break;
-            }
-            begin = *end;
-        }
-        (sum, rate)
+        let parts = &self.cut[node.half_rise[0] as usize];
+        let Inner { begin, sum, from, half_rise } =
+            &parts[parts.partition_point(|p| p.begin <= part).saturating_sub(1)];
+        let more = part - begin;
+        let rate = |c: usize| from[c] + more * half_rise[c];
+        (
+            std::array::from_fn(|c| sum[c] + more * rate(c)),
+            std::array::from_fn(|c| rate(c) + more * half_rise[c]),
+        )
     }
 
     /// The antiderivative at a position.
     #[inline(always)]
     pub(super) fn sum(&self, position: f32) -> [f64; 4] {
-        let (node, index, part) = self.node(position);
+        let (node, part) = self.node(position);
         let mut sum = node.sum;
         if node.half_rise[3].is_nan() {
-            let (inner, _) = self.among_jumps(index, part);
+            let (inner, _) = self.within(node, part);
             return std::array::from_fn(|c| sum[c] + inner[c]);
         }
         for (c, sum) in sum.iter_mut().enumerate() {
@@ -153,10 +166,10 @@ impl Table {
     /// Extinction times colour, and extinction, at a position; 1/mm.
     #[inline(always)]
     fn rate(&self, position: f32) -> [f32; 4] {
-        let (node, index, part) = self.node(position);
+        let (node, part) = self.node(position);
         let mut rate = node.from;
         if node.half_rise[3].is_nan() {
-            return self.among_jumps(index, part).1.map(|v| v as f32);
+            return self.within(node, part).1.map(|v| v as f32);
         }
         for (rate, half_rise) in rate.iter_mut().zip(node.half_rise) {
             *rate += 2.0 * part * half_rise;

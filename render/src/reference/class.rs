@@ -2,7 +2,6 @@
 //! integral can be split where they are not smooth.
 
 use super::light;
-use crate::scene::light::FLAT;
 use crate::volume::Transfer;
 
 /// What one panel may see change of 1 - opacity, as a ratio. This and the next are measured: see the
@@ -33,8 +32,6 @@ pub(super) struct Classes {
     knots: Vec<f64>,
     pieces: Vec<Piece>,
     unit_mm: f64,
-    /// Gradients below this do not light; 1/mm.
-    pub(super) flat_per_mm: f64,
 }
 
 impl Classes {
@@ -75,7 +72,7 @@ impl Classes {
         }
         knots.push(last.value);
         pieces.push(flat(last.value, last.rgba));
-        Self { knots, pieces, unit_mm, flat_per_mm: FLAT * (last.value - first.value) }
+        Self { knots, pieces, unit_mm }
     }
 
     /// The piece a value belongs to.

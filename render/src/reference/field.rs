@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::class::Classes;
 use super::cubic::Cubic;
+use crate::scene::light::{FLAT, value_span};
 use crate::scene::{Shading, VolumeItem};
 use crate::volume::{Grid, Samples};
 
@@ -21,6 +22,8 @@ pub(super) struct Field<'a> {
     pub(super) extent: [i64; 3],
     pub(super) classes: Classes,
     pub(super) lit: bool,
+    /// Gradients below this do not light; values per mm.
+    pub(super) flat_per_mm: f64,
     bricks: [usize; 3],
     /// For every brick of cells whether all of it is fully transparent; empty where none is skipped.
     clear: Vec<bool>,
@@ -37,6 +40,7 @@ impl<'a> Field<'a> {
             extent,
             classes: Classes::of(&item.transfer),
             lit: item.shading == Shading::Lit,
+            flat_per_mm: FLAT * value_span(&item.transfer, grid.range()),
             bricks,
             clear: Vec::new(),
         };

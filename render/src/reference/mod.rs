@@ -27,7 +27,8 @@
 //! differences, one voxel to either side along each voxel axis with places outside held at the edge,
 //! mapped to world by the inverse transpose of `world_from_voxel`. Light falls on either side of it,
 //! by |n·v|; where it is shorter than [`crate::scene::light::FLAT`] times the span of the control values,
-//! per mm, the colour is the plain one.
+//! per mm, the colour is the plain one. Control points all at one value have no span: there it is the span of
+//! the samples; and a volume of one value is plain throughout.
 //!
 //! **Labels**: where the nearest label at a point is n > 0 with colour (r, g, b, a), the colour c of the transfer
 //! function becomes (1 - a)·c + a·(r, g, b), before light; extinction stays. The nearest is by the labels' own

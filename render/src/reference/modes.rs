@@ -159,7 +159,7 @@ fn facing(part: &Part<'_>, line: &Line, at: &Passage, u: f64, direction: &Vector
     let per_voxel = part.field.gradients(at.cell).map(|g| along(&g, from, line.step).at(u));
     let gradient = part.gradient_to_world * Vector::from(per_voxel);
     let length = gradient.norm();
-    let lights = length > 0.0 && length >= part.field.classes.flat_per_mm;
+    let lights = length > 0.0 && length >= part.field.flat_per_mm;
     lights.then(|| (gradient.dot(direction).abs() / length).min(1.0))
 }
 

@@ -227,7 +227,7 @@ impl<'a> Walker<'a> {
         if field.lit {
             let per_voxel = field.gradients(self.cell).map(|g| along(&g, from, self.line.step));
             self.slope = Slope::new(&per_voxel, &self.part.gradient_to_world, &self.direction);
-            self.slope.breaks(length, field.classes.flat_per_mm, &mut self.breaks);
+            self.slope.breaks(length, field.flat_per_mm, &mut self.breaks);
         }
         if let (Some(painting), Some(line)) = (&self.part.painting, &self.label_line) {
             painting.walls(line, [self.entry, self.exit], &mut self.breaks);
@@ -250,7 +250,7 @@ impl<'a> Walker<'a> {
         let field = self.part.field;
         self.class = field.classes.find(self.value.at(middle));
         self.clear = field.classes.is_clear(self.class);
-        self.lit = field.lit && !self.clear && self.slope.lights(middle, field.classes.flat_per_mm);
+        self.lit = field.lit && !self.clear && self.slope.lights(middle, field.flat_per_mm);
         self.paint = match (&self.part.painting, &self.label_line) {
             (Some(painting), Some(line)) if !self.clear => painting.color_at(line, middle + self.entry),
             _ => None,

@@ -120,7 +120,8 @@ fn send(gpu: &Gpu, texels: &[[u32; 4]]) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
-/// A node in single precision. Of several jumps within it, the largest stands for all; the sums stay right.
+/// A node in single precision. Of several jumps within it, the largest stands for all, and a line for its bends; the sums
+/// stay right.
 struct Packed {
     /// Antiderivative at its begin: rounded, and what that left.
     sum: [f32; 4],
@@ -140,6 +141,11 @@ impl Packed {
         let (mut level, mut rise, mut jump) = (narrow(node.parts.mean([0.0, 1.0])), [0.0; 4], None);
         match &node.parts {
             Parts::Whole([from, to]) => rise = std::array::from_fn(|c| (to[c] - from[c]) as f32),
+            Parts::Bends(parts) => {
+                let [from, to] = [parts[0].ends[0], parts[parts.len() - 1].ends[1]].map(narrow);
+                // A line of the same mean that is nowhere below nothing.
+                rise = std::array::from_fn(|c| (to[c] - from[c]).max(-2.0 * level[c]).min(2.0 * level[c]));
+            }
             Parts::Jumps(parts) => {
                 let height = |i: &usize| (parts[i + 1].ends[0][3] - parts[*i].ends[1][3]).abs();
                 let largest = (0..parts.len() - 1).max_by(|a, b| height(a).total_cmp(&height(b)));

@@ -256,3 +256,36 @@ fn a_camera_that_shows_nothing_is_refused() {
     let result = draw_pixels(&scene(Vec::new(), Vec::new(), camera), [2, 2], &Options::default(), &[(0, 0)]);
     assert_eq!(result, Err(CameraError::NoDirection.into()), "eye and target are one");
 }
+
+/// Values that rise by `rise` a mm along x in all of the volume but its far corner, where one sample is 1000.
+fn ramp(rise: f64) -> VolumeItem {
+    let grid = synth::from_voxels([12; 3], Affine::identity(), |at| {
+        if at == [11; 3] { 1000.0 } else { rise * at[0] as f64 }
+    });
+    volume(grid.expect("a grid"), flat([0.5, 0.4, 0.3, 0.1]))
+}
+
+/// Gradients across the ray take all but the ambient part of the light, so that light is seen.
+#[test]
+fn a_function_of_one_value_measures_gradients_by_the_samples() {
+    let camera = parallel(Point::new(4.0, -20.0, 4.0), Point::new(4.0, 0.0, 4.0), 4.0);
+    let jump = transfer(&[point(-1.0, [0.5, 0.4, 0.3, 0.1]), point(-1.0, [0.6, 0.4, 0.3, 0.1])]);
+    for (rise, lights) in [(0.0, false), (1e-9, false), (0.99, false), (1.01, true), (5.0, true)] {
+        for transfer in [flat([0.5, 0.4, 0.3, 0.1]), Arc::clone(&jump)] {
+            let plain = VolumeItem { transfer, ..ramp(rise) };
+            let lit = VolumeItem { shading: Shading::Lit, ..plain.clone() };
+            let [plain, lit] =
+                [plain, lit].map(|item| pixels(&scene(vec![item], Vec::new(), camera), [3, 3]));
+            assert_eq!(plain != lit, lights, "a rise of {rise} a mm: {:?} and {:?}", plain[0], lit[0]);
+        }
+    }
+}
+
+#[test]
+fn a_volume_of_one_value_is_plain_in_any_light() {
+    let camera = perspective(Point::new(4.0, -20.0, 4.0), Point::new(4.0, 0.0, 4.0));
+    let plain = block([7, 8, 9], [0.5, 0.4, 0.3, 0.1]);
+    let lit = VolumeItem { shading: Shading::Lit, ..plain.clone() };
+    let [plain, lit] = [plain, lit].map(|item| pixels(&scene(vec![item], Vec::new(), camera), [5, 5]));
+    assert_eq!(plain, lit, "there is no gradient");
+}

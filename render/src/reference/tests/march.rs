@@ -35,6 +35,8 @@ fn at(item: &VolumeItem, piece: &Piece, p: &Point, direction: &Vector) -> Option
     let gradient = world_from_voxel.normal(&slope);
     let points = item.transfer.points();
     let span = points[points.len() - 1].value - points[0].value;
+    let [low, high] = item.grid.range();
+    let span = if span > 0.0 { span } else { high - low };
     let steep = gradient.norm() >= FLAT * span && gradient.norm() > 0.0;
     Some((if steep { lit(color, gradient.normalize().dot(direction).abs()) } else { color }, tau))
 }

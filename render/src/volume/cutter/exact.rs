@@ -11,7 +11,8 @@ pub(in super::super) fn plane_sign(n: &Vector, p: &Point, q: &Point) -> f64 {
     sign_of_sum([(n.x, p.x), (n.y, p.y), (n.z, p.z), (-n.x, q.x), (-n.y, q.y), (-n.z, q.z)])
 }
 
-/// A number with the sign of the sum of six products, exactly, where none overflows or underflows.
+/// A number with the sign of the sum of six products, exactly, where none overflows or underflows; its size is
+/// the sum's, as far as a plain evaluation goes. With all signs of one factor turned the number's sign turns.
 ///
 /// A plain evaluation decides where its error bound allows; otherwise the six products are added as an
 /// expansion without rounding. Source: Shewchuk 1997, "Adaptive Precision Floating-Point Arithmetic",
