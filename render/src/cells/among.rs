@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::blocks::{Near, fill, in_view};
 use super::clusters::Grain;
 use super::project::{Gathered, Projector};
-use super::scan::{Raw, Rect};
+use super::scan::{PIXELS, Raw, Rect};
 use super::stats::Counts;
 use super::table::{Place, Table};
 use super::{CellsError, Options, Placed};
@@ -39,6 +39,7 @@ impl Among {
 
 /// Pixels that a block is wide: what the rays of one have must be sorted while it is at hand.
 const BLOCK: usize = 64;
+const _: () = assert!(BLOCK <= PIXELS, "a block is scan-converted at once");
 
 /// What the rays of some rows have of a grid, in blocks side by side; kept from strip to strip.
 #[derive(Debug, Default)]

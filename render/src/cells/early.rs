@@ -31,9 +31,7 @@ pub struct Early {
 impl Early {
     /// As in the paper, for comparing: a threshold of 0.9, 20 subscreens.
     pub const TAKAYAMA: Self = Self { threshold: 0.9, subscreens: Some(20), refreshes: 100 };
-}
 
-impl Early {
     /// Adds half of what may lie behind a pixel that something may have been left out of, if that is terminated; `most` is the
     /// most that a colour has there. It is no segment: these do not add up to it.
     #[inline]

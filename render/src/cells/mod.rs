@@ -2,11 +2,11 @@
 //!
 //! After Takayama et al., "Cell-projection parallel volume rendering with early ray termination":
 //!
-//! 1. `split`, `clusters`: cells become tetrahedra, the same across a shared face, in clusters of up to a thousand near ones.
-//!    That is done once a grid.
+//! 1. `split`, `clusters`: cells become tetrahedra, the same across a shared face, in clusters of up to some thousand near
+//!    ones. That is done once a grid.
 //! 2. `lens`, `in_view`: corners are projected, and cells that may show put roughly in order of depth. That is done once a
 //!    picture.
-//! 3. `scan`: each tetrahedron is scan-converted: for every pixel whose ray passes it, where the ray enters and leaves it, and
+//! 3. `scan`: tetrahedra are scan-converted, several at once: for every pixel whose ray passes it, where the ray enters and leaves it, and
 //!    the scalar there. Exact predicates decide near edges which rays those are, and neighbours agree to the bit about depth
 //!    on the face that they share: no ray passes between two cells or through both at once.
 //! 4. `table`, `fold`: each stretch is integrated for a scalar that runs linearly and the transfer function as it is; a

@@ -6,7 +6,7 @@ use super::in_view::InView;
 use super::lens::Lens;
 use super::lists::{of_pixel, put_by_pixel};
 use super::runs::{MIXED, NONE, Open, Run, go_on};
-use super::scan::{Found, Raw, Rect, Scanner, Shown};
+use super::scan::{Found, PIXELS, Raw, Rect, Scanner, Shown};
 use super::stats::Counts;
 use super::table::{BATCH, Batch, Stretches, Table};
 use crate::simd::{Eight, Four, PlainEight, PlainFour};
@@ -15,6 +15,7 @@ use crate::simd::{WideEight, WideFour};
 
 /// Pixels that a cluster is drawn in at once, across and down: what it makes there has to be remembered.
 const TILE: i32 = 128;
+const _: () = assert!(TILE as usize <= PIXELS, "a tile is scan-converted at once");
 /// Cells after which it is asked which of the others can still be seen.
 const PART: usize = 512;
 

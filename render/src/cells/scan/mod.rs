@@ -16,7 +16,7 @@ mod tests;
 use crate::simd::Four;
 use planes::Passed;
 use scanner::ROOM;
-pub(super) use scanner::{Cells, Scanner};
+pub(super) use scanner::{Cells, PIXELS, Scanner};
 
 /// Pixels that go at once.
 const LANES: usize = 4;

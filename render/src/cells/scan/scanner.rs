@@ -13,8 +13,9 @@ use crate::simd::{Four, fetch};
 const CELLS: usize = 16;
 /// The same of fours of rows.
 const FOURS: usize = 128;
-/// Pixels of the boxes of cells that go at once, at most: a cell of more goes in several parts, one below the other.
-const PIXELS: usize = 1520;
+/// Pixels of the boxes of cells that go at once, at most: a cell of more goes in several parts, one below the other. So wide may
+/// be what is scan-converted at once.
+pub(in super::super) const PIXELS: usize = 1520;
 /// Pixels that are written at once.
 const WRITTEN: usize = 8;
 /// Enough to hand it on.
@@ -148,8 +149,7 @@ impl Places {
 }
 
 impl Scanner {
-    /// Finds what the rays of `tile`, some hundred pixels wide at most, have of cells, in the order of these. Pixels are counted
-    /// in `rect`. Whenever much is gathered it goes to `full`; what is left stays here.
+    /// Finds what the rays of `tile`, [`PIXELS`] wide at most, have of cells, in the order of these. Pixels are counted in `rect`. Whenever much is gathered it goes to `full`; what is left stays here.
     #[inline(always)]
     pub(in super::super) fn scan<F: Four>(
         &mut self,
@@ -165,6 +165,10 @@ impl Scanner {
             let mut flat = None;
             while let Some(shown) = cells.shown.get(next) {
                 let mut reach = shown.reach.meet(tile);
+                if reach.is_empty() {
+                    next += 1;
+                    continue;
+                }
                 let bottom = reach.high[1];
                 reach.low[1] = rest.unwrap_or(reach.low[1]);
                 reach.high[1] = bottom.min(reach.low[1] + most_rows(&reach));

@@ -87,6 +87,18 @@ fn pixels_are_those_that_exact_predicates_pass_in_the_same_order() {
             let off = (0..2).map(|end| (a.2[end] - b.2[end]).abs()).fold(0.0, f32::max);
             assert!(off < 1e-4, "kind {kind}, {perspective}: {a:?}, {b:?}");
         }
+        // In parts, into which not all cells reach, the same pixels are found once each.
+        let mut parts = Vec::new();
+        let (mut scanner, middle) = (Box::<Scanner>::default(), 41);
+        for part in
+            [Rect { high: [middle, TILE.high[1]], ..TILE }, Rect { low: [middle, TILE.low[1]], ..TILE }]
+        {
+            scanner.scan::<PlainFour>(cells, [&TILE, &part], perspective, &mut |found| of(found, &mut parts));
+            of(scanner.rest(), &mut parts);
+        }
+        let (mut parts, mut whole) = (pixels(&parts), pixels(&found));
+        (parts.sort_unstable(), whole.sort_unstable());
+        assert_eq!(parts, whole, "kind {kind}, {perspective}");
         #[cfg(target_arch = "x86_64")]
         if crate::simd::has_wide() {
             assert_eq!(scanned::<crate::simd::WideFour>(cells, perspective), found, "kind {kind}");

@@ -53,6 +53,26 @@ fn any_number_of_workers_and_either_engine_give_the_same_bytes() {
 }
 
 #[test]
+fn pictures_of_several_tiles_are_the_same_bytes() {
+    let size = [300, 170];
+    let (item, camera) = scene(6);
+    let blocks = draw(&item, &camera, size, &workers(2, Engine::Blocks));
+    for count in [1, 3] {
+        let picture = draw(&item, &camera, size, &workers(count, Engine::Threads));
+        assert_eq!(picture.image.pixels, blocks.image.pixels, "{count} workers");
+        assert_eq!(picture.segments, blocks.segments, "{count} workers");
+    }
+    let (item, camera) = dense(6);
+    let whole = draw(&item, &camera, size, &workers(2, Engine::Blocks));
+    for engine in [Engine::Blocks, Engine::Threads, Engine::Simulated] {
+        let options = Options { early: Some(Early::default()), ..workers(3, engine) };
+        let picture = draw(&item, &camera, size, &options);
+        let off = picture.image.difference(&whole.image, [0.0; 3]).expect("same size").max;
+        assert!(off <= 1.0, "{engine:?}: off by {off} of 1/255");
+    }
+}
+
+#[test]
 fn either_kind_of_instructions_gives_the_same_bytes() {
     let (item, camera) = scene(6);
     // Straight on, many faces are seen exactly from aside; inside, cells reach behind the eye.
