@@ -97,7 +97,8 @@ fn pixels_are_those_that_exact_predicates_pass_in_the_same_order() {
             of(scanner.rest(), &mut parts);
         }
         let (mut parts, mut whole) = (pixels(&parts), pixels(&found));
-        (parts.sort_unstable(), whole.sort_unstable());
+        parts.sort_unstable();
+        whole.sort_unstable();
         assert_eq!(parts, whole, "kind {kind}, {perspective}");
         #[cfg(target_arch = "x86_64")]
         if crate::simd::has_wide() {
