@@ -45,7 +45,7 @@ impl InView {
         }
         #[cfg(target_arch = "x86_64")]
         {
-            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
             fn wide(
                 view: &mut InView,
                 frame: &Frame<'_>,

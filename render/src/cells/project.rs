@@ -168,7 +168,7 @@ impl Projector {
         }
         #[cfg(target_arch = "x86_64")]
         {
-            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
             fn wide(
                 projector: &mut Projector,
                 frame: &Frame<'_>,
@@ -249,7 +249,7 @@ impl Projector {
             }
             #[cfg(target_arch = "x86_64")]
             {
-                #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+                #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
                 fn wide(projector: &mut Projector, frame: &Frame<'_>, of: &InView, rect: &Rect) {
                     projector.collect::<WideFour>(frame, of, rect, None);
                 }
@@ -275,7 +275,7 @@ impl Projector {
         }
         #[cfg(target_arch = "x86_64")]
         {
-            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
             fn wide(gathered: &mut Gathered, frame: &Frame<'_>, rect: &Rect) {
                 gathered.integrate::<WideEight>(frame, rect);
             }

@@ -67,7 +67,7 @@ pub(super) fn go_on(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open:
     }
     #[cfg(target_arch = "x86_64")]
     {
-        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
         fn wide(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
             go_on_by::<WideEight>(frame, raws, batch, open);
         }

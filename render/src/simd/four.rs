@@ -30,6 +30,29 @@ pub(crate) trait Four: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     fn to_f32(self) -> [f32; 4];
     /// Each two bits of `ORDER` say which comes there, the lowest first.
     fn picked<const ORDER: i32>(self) -> Self;
+    /// In an order that is not known before.
+    fn ordered(self, order: &Order) -> Self;
+    /// From rows, the first of each, and so on.
+    fn columns(rows: [[f64; 4]; 4]) -> [Self; 4];
+    /// The sum of each: that of its first two and that of its last two, added.
+    fn sums(of: [Self; 4]) -> Self;
+}
+
+/// Which of four come first, second, and so on: halves of numbers, as the machine has it.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
+pub(crate) struct Order([u32; 8]);
+
+impl Order {
+    pub(crate) const fn new(of: [u8; 4]) -> Self {
+        let mut halves = [0; 8];
+        let mut n = 0;
+        while n < 8 {
+            halves[n] = 2 * (of[n / 2] & 3) as u32 + (n % 2) as u32;
+            n += 1;
+        }
+        Self(halves)
+    }
 }
 
 /// By whatever instructions there are.
@@ -110,6 +133,21 @@ impl Four for Plain {
     fn picked<const ORDER: i32>(self) -> Self {
         Self(std::array::from_fn(|n| self.0[(ORDER >> (2 * n) & 3) as usize]))
     }
+
+    #[inline(always)]
+    fn ordered(self, order: &Order) -> Self {
+        Self(std::array::from_fn(|n| self.0[(order.0[2 * n] / 2 & 3) as usize]))
+    }
+
+    #[inline(always)]
+    fn columns(rows: [[f64; 4]; 4]) -> [Self; 4] {
+        std::array::from_fn(|n| Self(rows.map(|row| row[n])))
+    }
+
+    #[inline(always)]
+    fn sums(of: [Self; 4]) -> Self {
+        Self(of.map(|Self([a, b, c, d])| (a + b) + (c + d)))
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -124,16 +162,17 @@ pub(crate) use wide::Wide;
 mod wide {
     use std::arch::x86_64::{
         __m256d, _CMP_LT_OQ, _mm_loadu_si128, _mm_storeu_ps, _mm_storeu_si128, _mm256_add_epi32,
-        _mm256_add_pd, _mm256_and_pd, _mm256_blendv_pd, _mm256_castsi256_pd, _mm256_cmp_pd,
-        _mm256_cvtepi32_pd, _mm256_cvtpd_ps, _mm256_cvttpd_epi32, _mm256_div_pd, _mm256_loadu_pd,
-        _mm256_loadu_si256, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd,
-        _mm256_permute4x64_pd, _mm256_set1_epi32, _mm256_set1_epi64x, _mm256_set1_pd, _mm256_storeu_pd,
-        _mm256_storeu_si256, _mm256_sub_pd,
+        _mm256_add_pd, _mm256_and_pd, _mm256_blendv_pd, _mm256_castpd_ps, _mm256_castps_pd,
+        _mm256_castsi256_pd, _mm256_cmp_pd, _mm256_cvtepi32_pd, _mm256_cvtpd_ps, _mm256_cvttpd_epi32,
+        _mm256_div_pd, _mm256_hadd_pd, _mm256_loadu_pd, _mm256_loadu_si256, _mm256_max_pd, _mm256_min_pd,
+        _mm256_movemask_pd, _mm256_mul_pd, _mm256_permute2f128_pd, _mm256_permute4x64_pd,
+        _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_epi64x, _mm256_set1_pd, _mm256_storeu_pd,
+        _mm256_storeu_si256, _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd,
     };
     use std::ops::{Add, Mul, Sub};
 
     use super::super::wide;
-    use super::Four;
+    use super::{Four, Order};
 
     /// By AVX2. Only code that is called where `has_wide` says yes names this type.
     #[derive(Debug, Clone, Copy)]
@@ -224,6 +263,41 @@ mod wide {
         #[inline(always)]
         fn picked<const ORDER: i32>(self) -> Self {
             Self(unsafe { _mm256_permute4x64_pd::<ORDER>(self.0) })
+        }
+
+        #[inline(always)]
+        fn ordered(self, order: &Order) -> Self {
+            Self(unsafe {
+                let halves = _mm256_loadu_si256(order.0.as_ptr().cast());
+                _mm256_castps_pd(_mm256_permutevar8x32_ps(_mm256_castpd_ps(self.0), halves))
+            })
+        }
+
+        #[inline(always)]
+        fn columns([a, b, c, d]: [[f64; 4]; 4]) -> [Self; 4] {
+            let [Self(a), Self(b), Self(c), Self(d)] =
+                [Self::from_array(a), Self::from_array(b), Self::from_array(c), Self::from_array(d)];
+            unsafe {
+                let (ab, cd) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+                let (ba, dc) = (_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+                [
+                    Self(_mm256_permute2f128_pd::<0x20>(ab, cd)),
+                    Self(_mm256_permute2f128_pd::<0x20>(ba, dc)),
+                    Self(_mm256_permute2f128_pd::<0x31>(ab, cd)),
+                    Self(_mm256_permute2f128_pd::<0x31>(ba, dc)),
+                ]
+            }
+        }
+
+        #[inline(always)]
+        fn sums([a, b, c, d]: [Self; 4]) -> Self {
+            unsafe {
+                // Of a and b in turn, of their first two and their last two; the same of c and d.
+                let (ab, cd) = (_mm256_hadd_pd(a.0, b.0), _mm256_hadd_pd(c.0, d.0));
+                let first = _mm256_permute2f128_pd::<0x20>(ab, cd);
+                let last = _mm256_permute2f128_pd::<0x31>(ab, cd);
+                Self(_mm256_add_pd(first, last))
+            }
         }
     }
 }

@@ -4,7 +4,7 @@ mod eight;
 mod four;
 
 pub(crate) use eight::{Eight, Plain as PlainEight};
-pub(crate) use four::{Four, Plain as PlainFour};
+pub(crate) use four::{Four, Order, Plain as PlainFour};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use {eight::Wide as WideEight, four::Wide as WideFour};
 
@@ -16,6 +16,7 @@ pub(crate) fn has_wide() -> bool {
             && is_x86_feature_detected!("bmi1")
             && is_x86_feature_detected!("bmi2")
             && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt")
     }
     #[cfg(not(target_arch = "x86_64"))]
     false

@@ -28,12 +28,20 @@ pub(super) struct Corner {
     /// Place in the picture, pixels, times w.
     pub(super) x: f64,
     pub(super) y: f64,
-    pub(super) w: f64,
-    /// Depth; mm before the eye plane.
-    pub(super) z: f64,
     /// What runs linearly over the picture and grows with depth: see `planes`. Not a number where w is not 1.
     pub(super) rank: f64,
     pub(super) scalar: f64,
+    pub(super) w: f64,
+    /// Depth; mm before the eye plane.
+    pub(super) z: f64,
+}
+
+impl Corner {
+    /// Its place, rank and scalar.
+    #[inline(always)]
+    fn row(&self) -> [f64; 4] {
+        [self.x, self.y, self.rank, self.scalar]
+    }
 }
 
 /// Pixels from `low` up to but not at `high`.

@@ -5,10 +5,6 @@
 
 use crate::simd::Four;
 
-/// By how many faces are near, which are paired, near and far, with the near ones first; where there are but three pairs one
-/// of them twice.
-const PAIRS: [[[usize; 4]; 2]; 4] =
-    [[[0; 4]; 2], [[0, 0, 0, 0], [1, 2, 3, 3]], [[0, 0, 1, 1], [2, 3, 2, 3]], [[0, 1, 2, 2], [3, 3, 3, 3]]];
 /// A little less than to the next column.
 const NEXT: f64 = 1.0 - 1e-9;
 
@@ -24,13 +20,12 @@ impl Outline {
     /// Nothing.
     pub(super) const NONE: Self = Self { left: [[0.0; 4]; 2], right: [[0.0; 4]; 2] };
 
-    /// Of planes, rank at (i, j) being (c + b·j) + a·i, of which `near` are near and come first. All rays along which the ranks of
-    /// two are apart by more than minus half of both their `slack`, the other half being left for what rounding does here.
+    /// Of pairs of planes, a near and a far one, with an edge of the outline between them: at (i, j) the far one ranks
+    /// (c + b·j) + a·i behind the near one. All rays along which that is more than minus `slack`: twice that is allowed, the
+    /// other half for what rounding does here.
     #[inline(always)]
-    pub(super) fn set<F: Four>(&mut self, [a, b, c]: [&[f64; 4]; 3], near: u32, slack: &[f64; 4]) {
-        let pairs = &PAIRS[near as usize & 3];
-        let (a, b) = (apart::<F>(a, pairs), apart::<F>(b, pairs));
-        let c = apart::<F>(c, pairs) + (picked::<F>(slack, &pairs[0]) + picked(slack, &pairs[1]));
+    pub(super) fn set<F: Four>(&mut self, [a, b, c]: [F; 3], slack: F) {
+        let c = c + (slack + slack);
         let none = F::all(0.0);
         let part = (none - a).inverse();
         let (first, step) = (c * part, b * part);
@@ -57,15 +52,4 @@ impl Outline {
         right = F::all(f64::from(last)).either(rows, F::all(f64::from(low - 1)), right);
         [(left + F::all(NEXT)).to_whole(), (right + F::all(1.0)).to_whole()]
     }
-}
-
-/// By how much the far plane of each pair has more than the near one.
-#[inline(always)]
-fn apart<F: Four>(v: &[f64; 4], [near, far]: &[[usize; 4]; 2]) -> F {
-    picked::<F>(v, far) - picked(v, near)
-}
-
-#[inline(always)]
-fn picked<F: Four>(v: &[f64; 4], of: &[usize; 4]) -> F {
-    F::from_array([v[of[0]], v[of[1]], v[of[2]], v[of[3]]])
 }

@@ -10,8 +10,8 @@
 //! them, the ray is left to exact predicates (`sides`). So is a cell that is too flat to have such planes.
 
 use super::outline::Outline;
-use super::{Corner, FACES, Tetrahedron, scalars};
-use crate::simd::{Four, PlainFour};
+use super::{Corner, FACES, Tetrahedron};
+use crate::simd::{Four, Order, PlainFour};
 
 /// Roundings, of which an error is made up at most, in units in the last place.
 const ROUNDINGS: f64 = 32.0 * f64::EPSILON;
@@ -23,6 +23,8 @@ const NARROW: f64 = 1e-6;
 const FLAT: f64 = 1e-7;
 /// All four faces.
 const ALL: u32 = 0b1111;
+/// What the scalars of corners come in with where it is found how much it changes, by the faces across from them.
+const SIGNS: [f64; 4] = [0.0, 1.0, -1.0, 1.0];
 /// The first and third face: of a positive tetrahedron, a normal by the right hand there points away from the corner across.
 const EVEN: u32 = 0b0101;
 
@@ -64,6 +66,8 @@ pub(super) fn depth(rank: f64, perspective: bool) -> f64 {
 struct Faces<F> {
     /// Right, down and in rank, of each corner.
     places: [F; 3],
+    /// Of each corner.
+    scalars: F,
     a: F,
     b: F,
     c: F,
@@ -80,9 +84,7 @@ impl<F: Four> Faces<F> {
     #[inline(always)]
     fn new(corners: &[&Corner; 4]) -> Self {
         let [p, q, r, s] = corners;
-        let x = F::from_array([p.x, q.x, r.x, s.x]);
-        let y = F::from_array([p.y, q.y, r.y, s.y]);
-        let z = F::from_array([p.rank, q.rank, r.rank, s.rank]);
+        let [x, y, z, scalars] = F::columns([p.row(), q.row(), r.row(), s.row()]);
         // From the first corner of each face to its second and third, as `FACES` has them.
         let u = [second(x) - first(x), second(y) - first(y), second(z) - first(z)];
         let v = [third(x) - first(x), third(y) - first(y), third(z) - first(z)];
@@ -98,7 +100,7 @@ impl<F: Four> Faces<F> {
         let known =
             (size_z * F::all(CANCELLED)).below(nz.abs()) & c.abs().below(F::all(f64::INFINITY)) & !narrow;
         let (normal, size) = ([nx, ny, nz], [size_x, size_y, size_z]);
-        Self { places: [x, y, z], a, b, c, normal, size, part, known }
+        Self { places: [x, y, z], scalars, a, b, c, normal, size, part, known }
     }
 
     #[inline(always)]
@@ -132,28 +134,53 @@ fn cross<F: Four>(u: [F; 2], v: [F; 2]) -> (F, F) {
     (p - q, p.abs() + q.abs())
 }
 
-/// Faces with the near ones first, by which are near, a bit each.
-const ORDERS: [[u8; 4]; 16] = orders();
+/// Of the faces, those that are near first; then by pairs of a near one and a far one, each with an edge of the outline between
+/// them, the near ones and the far ones. Where there are but three pairs one comes twice.
+#[derive(Debug, Clone, Copy)]
+struct Orders {
+    /// How many are near.
+    near: u32,
+    all: Order,
+    pairs: [Order; 2],
+}
 
-const fn orders() -> [[u8; 4]; 16] {
-    let mut orders = [[0; 4]; 16];
-    let mut code = 0;
+/// By which faces are near, a bit each.
+const ORDERS: [Orders; 16] = orders();
+
+/// By how many are near: which are paired, by their places among all.
+const PAIRS: [[[u8; 4]; 2]; 4] =
+    [[[0; 4]; 2], [[0, 0, 0, 0], [1, 2, 3, 3]], [[0, 0, 1, 1], [2, 3, 2, 3]], [[0, 1, 2, 2], [3, 3, 3, 3]]];
+
+const fn orders() -> [Orders; 16] {
+    let none = Order::new([0; 4]);
+    let mut orders = [Orders { near: 0, all: none, pairs: [none; 2] }; 16];
+    let mut code = 0_usize;
     while code < 16 {
+        let mut faces = [0; 4];
         let (mut count, mut pass) = (0, 0);
         while pass < 2 {
             let mut face = 0;
             while face < 4 {
                 if (code >> face) & 1 == 1 - pass {
-                    orders[code][count] = face;
+                    faces[count] = face;
                     count += 1;
                 }
                 face += 1;
             }
             pass += 1;
         }
+        let near = code.count_ones();
+        let [one, other] = &PAIRS[near as usize & 3];
+        let pairs = [of_pairs(&faces, one), of_pairs(&faces, other)];
+        orders[code] = Orders { near, all: Order::new(faces), pairs };
         code += 1;
     }
     orders
+}
+
+const fn of_pairs(faces: &[u8; 4], places: &[u8; 4]) -> Order {
+    let [p, q, r, s] = *places;
+    Order::new([faces[p as usize], faces[q as usize], faces[r as usize], faces[s as usize]])
 }
 
 /// A tetrahedron before the camera, ready for rays that pass clear of its edges.
@@ -165,15 +192,13 @@ pub(super) struct Cell {
     c: [f64; 4],
     /// How many are near; 1 to 3.
     pub(super) near: u32,
-    /// Differences of rank which rounding may have made.
-    unsure: f64,
-    /// The same between near faces: first and second, first and third, second and third.
-    unsure_near: [f64; 3],
-    /// What the outline has to allow for each plane: see there.
-    slack: [f64; 4],
-    /// The scalar of the first corner, and what it changes: at the first pixel, for one to the right, down, and in rank. Where
+    /// Differences of rank which rounding may have made: between near faces, first and second, first and third, second and
+    /// third; and between others.
+    unsure: [f64; 4],
+    /// The scalar of the first corner, and what it changes: at the first pixel; for one to the right, down, and in rank. Where
     /// rays come from one eye the change is to be multiplied by depth.
     from: f64,
+    at_first: f64,
     change: [f64; 4],
 }
 
@@ -184,75 +209,83 @@ impl Cell {
         b: [0.0; 4],
         c: [0.0; 4],
         near: 0,
-        unsure: 0.0,
-        unsure_near: [0.0; 3],
-        slack: [0.0; 4],
+        unsure: [0.0; 4],
         from: 0.0,
+        at_first: 0.0,
         change: [0.0; 4],
     };
 
-    /// Becomes a tetrahedron; none if that is too flat, not wholly before the eye, or has no sides that could be told.
+    /// Becomes a tetrahedron, and finds its outline; none if that is too flat, not wholly before the eye, or has no sides that
+    /// could be told.
     #[inline(always)]
-    pub(super) fn set<F: Four>(&mut self, of: &Tetrahedron<'_>, perspective: bool) -> Option<()> {
-        let (corners, scalars) = (&of.0, scalars(of));
-        let faces = Faces::<F>::new(corners);
-        let [x, y, z] = faces.places.map(F::to_array);
-        let [nx, ny, nz] = faces.normal.map(F::to_array);
-        let volume = ((x[1] - x[0]) * nx[1] + (y[1] - y[0]) * ny[1]) + (z[1] - z[0]) * nz[1];
-        let spread = [spread(x), spread(y), spread(z)];
-        let nearest = corners[0].z.min(corners[1].z).min(corners[2].z.min(corners[3].z));
-        // Written so that what is not a number is not plain.
+    pub(super) fn set<F: Four>(
+        &mut self,
+        outline: &mut Outline,
+        of: &Tetrahedron<'_>,
+        perspective: bool,
+    ) -> Option<()> {
+        let faces = Faces::<F>::new(&of.0);
+        let ([x, y, z], [nx, ny, nz]) = (faces.places, faces.normal);
+        let (x0, y0, z0) = (alike(x), alike(y), alike(z));
+        let (dx, dy, dz) = (x - x0, y - y0, z - z0);
+        let none = F::all(0.0);
+        // Not less than the least and greatest are apart.
+        let spreads = F::sums([dx.abs(), dy.abs(), dz.abs(), none]);
+        let spread = spreads.to_array();
+        let volume = ((dx * nx + dy * ny) + dz * nz).to_array()[1];
+        // Written so that what is not a number is not plain; from one eye a corner that is not before it has no rank.
         let full = volume.abs() >= FLAT * (spread[0] * spread[1] * spread[2]) && volume.is_finite();
-        if !(nearest >= 0.0 && full) {
+        if !(full && (perspective || z.below(none) == 0)) {
             return None;
         }
         let turned = if volume < 0.0 { ALL & !EVEN } else { EVEN };
-        let mut near = F::all(0.0).below(faces.normal[2]) ^ turned;
+        let mut near = none.below(nz) ^ turned;
+        let (mut a, mut b, mut c) = (faces.a, faces.b, faces.c);
         // What rounding may have done to a plane over the cell.
-        let (a, b) = (faces.a.abs(), faces.b.abs());
-        let normal = (faces.size[0] + a * faces.size[2]) * F::all(spread[0])
-            + (faces.size[1] + b * faces.size[2]) * F::all(spread[1]);
-        let place = a * F::all(x[0].abs() + spread[0]) + b * F::all(y[0].abs() + spread[1]);
-        let wrong = (normal * faces.part.abs() + (place + faces.c.abs())) * F::all(ROUNDINGS);
-        let wrong = wrong.to_array();
-        let mut unsure = [(wrong[0] + wrong[1]) + (wrong[2] + wrong[3]); 4];
-        let mut planes = faces.planes();
-        if planes.known != ALL {
-            let normal = [nx, ny, nz];
-            let size = faces.size.map(F::to_array);
-            let of = [[x, y, z], normal, size];
-            (near, unsure) = steep(&mut planes, &of, [volume, spread[2]], wrong, near)?;
+        let (wide, high) = (spreads.picked::<0b00_00_00_00>(), spreads.picked::<0b01_01_01_01>());
+        let (right, down) = (a.abs(), b.abs());
+        let normal =
+            (faces.size[0] + right * faces.size[2]) * wide + (faces.size[1] + down * faces.size[2]) * high;
+        let place = right * (x0.abs() + wide) + down * (y0.abs() + high);
+        let wrong = (normal * faces.part.abs() + (place + c.abs())) * F::all(ROUNDINGS);
+        // How much the scalar changes: what it has more than that of the first corner, and for each of place.
+        let scalars = match of.1 {
+            Some(scalar) => F::all(scalar),
+            None => faces.scalars,
+        };
+        let mut rise = (scalars - alike(scalars)) * F::from_array(SIGNS);
+        if perspective {
+            rise = rise * (none - z);
+        }
+        let sums = F::sums([rise * nx, rise * ny, rise * nz, wrong]);
+        let mut unsure = sums.picked::<0b11_11_11_11>();
+        if faces.known != ALL {
+            let of = [[x, y, z], faces.normal, faces.size].map(|of| of.map(F::to_array));
+            let mut planes = faces.planes();
+            let (near_now, unsure_now) =
+                steep(&mut planes, &of, [volume, spread[2]], wrong.to_array(), near)?;
+            (near, unsure) = (near_now, F::from_array(unsure_now));
+            (a, b, c) = (F::from_array(planes.a), F::from_array(planes.b), F::from_array(planes.c));
         }
         if near == 0 || near == ALL {
             return None;
         }
-        let order = ORDERS[near as usize & 15].map(|face| usize::from(face & 3));
-        let pair = |one: usize, other: usize| unsure[order[one]].max(unsure[order[other]]);
-        let weight = |corner: usize| if perspective { -z[corner] } else { 1.0 };
-        let rise = |corner: usize| (scalars[corner] - scalars[0]) * weight(corner);
-        let [one, two, three] = [rise(1), rise(2), rise(3)];
-        let part = 1.0 / volume;
-        let slope = |n: &[f64; 4]| ((one * n[1] - two * n[2]) + three * n[3]) * part;
-        let [right, down, back] = [slope(&nx), slope(&ny), slope(&nz)];
-        let at_first = -((right * x[0] + down * y[0]) + back * z[0]);
-        for (place, from) in order.into_iter().enumerate() {
-            self.a[place] = planes.a[from];
-            self.b[place] = planes.b[from];
-            self.c[place] = planes.c[from];
-            self.slack[place] = 2.0 * unsure[from];
-        }
-        self.near = near.count_ones();
-        self.unsure = unsure[order[3]];
-        self.unsure_near = [pair(0, 1), pair(0, 2), pair(1, 2)];
-        self.from = scalars[0];
-        self.change = [at_first, right, down, back];
+        let orders = &ORDERS[near as usize & 15];
+        let slack = unsure.ordered(&orders.pairs[0]) + unsure.ordered(&orders.pairs[1]);
+        outline.set([apart(a, orders), apart(b, orders), apart(c, orders)], slack);
+        self.a = a.ordered(&orders.all).to_array();
+        self.b = b.ordered(&orders.all).to_array();
+        self.c = c.ordered(&orders.all).to_array();
+        self.near = orders.near;
+        let unsure = unsure.ordered(&orders.all);
+        let pairs = unsure.picked::<0b11_01_00_00>().most(unsure.picked::<0b11_10_10_01>());
+        self.unsure = pairs.to_array();
+        let change = (sums * F::all(1.0 / volume)).to_array();
+        let first = of.0[0];
+        self.from = scalars.to_array()[0];
+        self.at_first = -((change[0] * first.x + change[1] * first.y) + change[2] * first.rank);
+        self.change = change;
         Some(())
-    }
-
-    /// Finds its outline.
-    #[inline(always)]
-    pub(super) fn outline<F: Four>(&self, outline: &mut Outline) {
-        outline.set::<F>([&self.a, &self.b, &self.c], self.near, &self.slack);
     }
 
     /// Where rays pass, `NEAR` of the faces being near.
@@ -274,23 +307,23 @@ impl Cell {
         }
         let inside = leave - enter;
         // By how much all differences are beyond doubt.
-        let mut clear = inside.abs() - F::all(self.unsure);
+        let mut clear = inside.abs() - F::all(self.unsure[3]);
         for one in 0..NEAR {
             for other in one + 1..NEAR {
                 let apart = (ranks[one] - ranks[other]).abs();
-                clear = clear.least(apart - F::all(self.unsure_near[one + other - 1]));
+                clear = clear.least(apart - F::all(self.unsure[one + other - 1]));
             }
         }
         for one in NEAR..4 {
             for other in one + 1..4 {
-                clear = clear.least((ranks[one] - ranks[other]).abs() - F::all(self.unsure));
+                clear = clear.least((ranks[one] - ranks[other]).abs() - F::all(self.unsure[3]));
             }
         }
         let none = F::all(0.0);
-        let along = (F::all(self.change[0]) + F::all(self.change[2]) * y) + F::all(self.change[1]) * x;
+        let along = (F::all(self.at_first) + F::all(self.change[1]) * y) + F::all(self.change[0]) * x;
         let depth = |rank: F| if PERSPECTIVE { (none - rank).inverse() } else { rank };
         let value = |rank: F, depth: F| {
-            let change = along + F::all(self.change[3]) * rank;
+            let change = along + F::all(self.change[2]) * rank;
             F::all(self.from) + if PERSPECTIVE { change * depth } else { change }
         };
         let depths = [depth(enter), depth(leave)];
@@ -299,10 +332,16 @@ impl Cell {
     }
 }
 
-/// Not less than the least and greatest are apart.
+/// The first, four times.
 #[inline(always)]
-fn spread(v: [f64; 4]) -> f64 {
-    ((v[1] - v[0]).abs() + (v[2] - v[0]).abs()) + (v[3] - v[0]).abs()
+fn alike<F: Four>(v: F) -> F {
+    v.picked::<0b00_00_00_00>()
+}
+
+/// By how much the far plane of each pair has more than the near one.
+#[inline(always)]
+fn apart<F: Four>(v: F, Orders { pairs: [near, far], .. }: &Orders) -> F {
+    v.ordered(far) - v.ordered(near)
 }
 
 /// Where the rays of a group pass a cell.

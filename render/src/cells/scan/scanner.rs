@@ -225,10 +225,9 @@ impl Scanner {
     ) -> bool {
         let count = self.count % CELLS;
         let one = &mut self.waiting[count];
-        if one.cell.set::<F>(of, perspective).is_none() {
+        if one.cell.set::<F>(&mut one.outline, of, perspective).is_none() {
             return false;
         }
-        one.cell.outline::<F>(&mut one.outline);
         (one.number, one.last, one.columns) =
             (number as u32, reach.high[1] - 1, [reach.low[0], reach.high[0]]);
         self.count = count + 1;
