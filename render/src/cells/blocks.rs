@@ -44,7 +44,7 @@ impl Near {
     }
 
     /// What of it is before the camera, found now if it was not; cells that cannot show are counted then.
-    fn view(&self, frame: &Frame<'_>, scratch: &mut Vec<Chosen>, counts: &mut Counts) -> &InView {
+    fn view(&self, frame: &Frame<'_>, scratch: &mut Chosen, counts: &mut Counts) -> &InView {
         self.view.get_or_init(|| {
             let mut view = InView::default();
             view.fill(frame, self.cluster, scratch, counts);
@@ -68,12 +68,12 @@ pub(super) fn in_view(frame: &Frame<'_>) -> (Vec<Near>, Counts) {
 
 /// Brings all clusters before the camera, where all are needed; cells that cannot show are counted.
 pub(super) fn fill(frame: &Frame<'_>, near: &[Near], counts: &mut Counts) {
-    let fill = |scratch: &mut Vec<Chosen>, near: &Near| {
+    let fill = |scratch: &mut Chosen, near: &Near| {
         let mut counts = Counts::default();
         near.view(frame, scratch, &mut counts);
         counts
     };
-    let each: Vec<Counts> = near.par_iter().with_min_len(8).map_init(Vec::new, fill).collect();
+    let each: Vec<Counts> = near.par_iter().with_min_len(8).map_init(Chosen::default, fill).collect();
     for more in each {
         counts.add(more);
     }
@@ -85,7 +85,7 @@ struct Desk<'a> {
     manner: Manner,
     near: &'a [Near],
     projector: Projector,
-    scratch: Vec<Chosen>,
+    scratch: Chosen,
     log: Log,
     list: Vec<Segment>,
     /// The most that colours have.
@@ -100,7 +100,7 @@ impl<'a> Desk<'a> {
             manner,
             near,
             projector: Projector::default(),
-            scratch: Vec::new(),
+            scratch: Chosen::default(),
             log: Log::default(),
             list: Vec::new(),
             most: frame.table.most(),

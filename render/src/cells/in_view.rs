@@ -9,11 +9,20 @@ use crate::simd::WideFour;
 use crate::simd::{Four, PlainFour};
 use crate::volume::cells::Place;
 
+/// A little less than to the next pixel.
+const NEXT: f64 = 1.0 - 1e-9;
 /// Steps of depth in which cells are told apart for going through them from front to back.
 const STEPS: usize = 1024;
 
-/// One with the depths of its corners, added.
-pub(super) type Chosen = (Shown, f64);
+/// Cells that may show, while a cluster is brought before the camera.
+#[derive(Debug, Default)]
+pub(super) struct Chosen {
+    cells: Vec<Shown>,
+    /// Of each, the depths of its corners, added.
+    depths: Vec<f64>,
+    /// And its step of depth.
+    steps: Vec<i32>,
+}
 
 /// What of a cluster is before the camera.
 #[derive(Debug, Default)]
@@ -36,7 +45,7 @@ impl InView {
         &mut self,
         frame: &Frame<'_>,
         cluster: usize,
-        scratch: &mut Vec<Chosen>,
+        scratch: &mut Chosen,
         counts: &mut Counts,
     ) {
         if !frame.wide {
@@ -50,7 +59,7 @@ impl InView {
                 view: &mut InView,
                 frame: &Frame<'_>,
                 cluster: usize,
-                scratch: &mut Vec<Chosen>,
+                scratch: &mut Chosen,
                 counts: &mut Counts,
             ) {
                 view.fill_by::<WideFour>(frame, cluster, scratch, counts);
@@ -68,7 +77,7 @@ impl InView {
         &mut self,
         frame: &Frame<'_>,
         cluster: usize,
-        scratch: &mut Vec<Chosen>,
+        scratch: &mut Chosen,
         counts: &mut Counts,
     ) {
         let of_points = frame.scalars.place() == Place::Points;
@@ -83,23 +92,31 @@ impl InView {
             self.corners.extend(points.map(|p| frame.lens.corner(p, 0.0)));
             self.constants.extend(raw.iter().map(|&v| frame.table.position(v)));
         }
-        self.choose::<F>(frame, cluster, scratch, counts);
-        self.put_in_order(scratch);
+        let depths = self.choose::<F>(frame, cluster, scratch, counts);
+        self.put_in_order::<F>(scratch, depths);
     }
 
-    /// Decides which tetrahedra may show.
+    /// Decides which tetrahedra may show. The least and the most depth of these.
     #[inline(always)]
     fn choose<F: Four>(
         &self,
         frame: &Frame<'_>,
         cluster: usize,
-        chosen: &mut Vec<Chosen>,
+        chosen: &mut Chosen,
         counts: &mut Counts,
-    ) {
-        chosen.clear();
+    ) -> [f64; 2] {
+        chosen.cells.clear();
+        chosen.depths.clear();
         let picture = frame.rect();
+        let first = picture.low.map(f64::from);
+        let last = picture.high.map(|v| f64::from(v) - 1.0);
+        let first = F::from_array([first[0], first[1], f64::NEG_INFINITY, f64::NEG_INFINITY]);
+        let last = F::from_array([last[0], last[1], f64::INFINITY, f64::INFINITY]);
+        let one = F::all(1.0);
         let of_points = frame.scalars.place() == Place::Points;
         let raw = frame.scalars.of(cluster);
+        let some_clear = frame.skip_clear && frame.table.has_clear(frame.scalars.range(cluster));
+        let (mut near, mut far) = (F::all(f64::INFINITY), F::all(f64::NEG_INFINITY));
         for (index, tetrahedron) in frame.clusters.tetrahedra(cluster).iter().enumerate() {
             let [p, q, r, s] = tetrahedron.map(usize::from);
             let values = if of_points { [raw[p], raw[q], raw[r], raw[s]] } else { [raw[index]; 4] };
@@ -111,14 +128,17 @@ impl InView {
                 counts.not_finite += 1;
                 continue;
             }
-            if frame.skip_clear && frame.table.is_clear(range(values)) {
+            if some_clear && frame.table.is_clear(range(values)) {
                 counts.clear += 1;
                 continue;
             }
-            let [left, top, least_w, nearest] = p.least(q).least(r.least(s)).to_array();
-            let [right, bottom, most_w, farthest] = p.most(q).most(r.most(s)).to_array();
+            let (least, most) = (p.least(q).least(r.least(s)), p.most(q).most(r.most(s)));
+            let ([_, _, least_w, nearest], [_, _, most_w, farthest]) = (least.to_array(), most.to_array());
             let reach = if least_w == 1.0 && most_w == 1.0 {
-                Rect::between([left, top], [right, bottom]).meet(&picture)
+                // Within the picture there are whole numbers for all; a little more to the left and up does no harm.
+                let [left, top, ..] = (least.most(first).least(last + one) + F::all(NEXT)).to_whole();
+                let [right, bottom, ..] = (most.most(first - one).least(last) + one).to_whole();
+                Rect { low: [left, top], high: [right, bottom] }
             } else {
                 picture
             };
@@ -126,33 +146,42 @@ impl InView {
                 counts.outside += 1;
                 continue;
             }
-            let nearest = (nearest as f32).next_down();
-            chosen.push((Shown { corners: *tetrahedron, tetrahedron: index as u32, nearest, reach }, depth));
+            (near, far) = (near.least(least), far.most(most));
+            let nearest = (nearest - nearest.abs() * f64::from(f32::EPSILON)) as f32;
+            chosen.cells.push(Shown { corners: *tetrahedron, tetrahedron: index as u32, nearest, reach });
+            chosen.depths.push(depth);
         }
+        [near.to_array()[3], far.to_array()[3]]
     }
 
-    /// Puts what is chosen roughly in order of depth: most stretches then go on where the one before ended.
+    /// Puts what is chosen roughly in order of depth, which lies between two: most stretches then go on where the one before
+    /// ended.
     #[inline(always)]
-    fn put_in_order(&mut self, chosen: &[Chosen]) {
+    fn put_in_order<F: Four>(&mut self, chosen: &mut Chosen, [near, far]: [f64; 2]) {
         self.cells.clear();
-        let Some(&(any, _)) = chosen.first() else { return };
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for &(_, depth) in chosen {
-            (low, high) = (low.min(depth), high.max(depth));
+        let Chosen { cells, depths, steps } = chosen;
+        let Some(&any) = cells.first() else { return };
+        let (low, high) = (4.0 * near, 4.0 * far);
+        let scale = F::all(if high > low { STEPS as f64 / (high - low) } else { 0.0 });
+        let last = F::all((STEPS - 1) as f64);
+        steps.clear();
+        let count = depths.len();
+        depths.resize(count.next_multiple_of(4), 0.0);
+        for depths in depths.as_chunks().0 {
+            let step = (F::from_array(*depths) - F::all(low)) * scale;
+            steps.extend_from_slice(&step.most(F::all(0.0)).least(last).to_whole());
         }
-        let scale = if high > low { STEPS as f64 / (high - low) } else { 0.0 };
-        let step = |depth: f64| (((depth - low) * scale) as usize).min(STEPS - 1);
         let mut begins = [0_u32; STEPS];
-        for &(_, depth) in chosen {
-            begins[step(depth)] += 1;
+        for &step in &steps[..count] {
+            begins[step as usize % STEPS] += 1;
         }
         let mut begin = 0;
         for count in &mut begins {
             (*count, begin) = (begin, begin + *count);
         }
-        self.cells.resize(chosen.len(), any);
-        for &(shown, depth) in chosen {
-            let place = &mut begins[step(depth)];
+        self.cells.resize(count, any);
+        for (&shown, &step) in cells.iter().zip(&*steps) {
+            let place = &mut begins[step as usize % STEPS];
             self.cells[*place as usize] = shown;
             *place += 1;
         }
@@ -165,8 +194,10 @@ fn place<F: Four>(corner: &Corner) -> F {
     F::from_array([corner.x, corner.y, corner.w, corner.z])
 }
 
-/// The least and the greatest.
+/// The least and the greatest of numbers.
 #[inline(always)]
 fn range([a, b, c, d]: [f64; 4]) -> [f64; 2] {
-    [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]
+    let least = |a: f64, b: f64| if a < b { a } else { b };
+    let most = |a: f64, b: f64| if a > b { a } else { b };
+    [least(least(a, b), least(c, d)), most(most(a, b), most(c, d))]
 }

@@ -121,7 +121,7 @@ pub(super) struct Worker<'a, L> {
     table: Option<early::Table>,
     projector: Projector,
     view: InView,
-    scratch: Vec<Chosen>,
+    scratch: Chosen,
     /// Runs of a cluster, which with early termination cannot be taken while it is drawn.
     runs: Vec<(usize, Segment)>,
     phase: Phase,
@@ -166,7 +166,7 @@ impl<'a, L: Link> Worker<'a, L> {
             table: manner.early.map(|_| early::Table::new(&frame.rect(), manner.side)),
             projector: Projector::default(),
             view: InView::default(),
-            scratch: Vec::new(),
+            scratch: Chosen::default(),
             runs: Vec::new(),
             phase: Phase::Cells,
             since: 0,

@@ -136,7 +136,7 @@ impl Four for Plain {
 
     #[inline(always)]
     fn ordered(self, order: &Order) -> Self {
-        Self(std::array::from_fn(|n| self.0[(order.0[2 * n] / 2 & 3) as usize]))
+        Self(std::array::from_fn(|n| self.0[((order.0[2 * n] / 2) & 3) as usize]))
     }
 
     #[inline(always)]

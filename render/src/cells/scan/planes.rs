@@ -170,16 +170,15 @@ const fn orders() -> [Orders; 16] {
             pass += 1;
         }
         let near = code.count_ones();
-        let [one, other] = &PAIRS[near as usize & 3];
-        let pairs = [of_pairs(&faces, one), of_pairs(&faces, other)];
+        let [one, other] = PAIRS[near as usize & 3];
+        let pairs = [of_pairs(faces, one), of_pairs(faces, other)];
         orders[code] = Orders { near, all: Order::new(faces), pairs };
         code += 1;
     }
     orders
 }
 
-const fn of_pairs(faces: &[u8; 4], places: &[u8; 4]) -> Order {
-    let [p, q, r, s] = *places;
+const fn of_pairs(faces: [u8; 4], [p, q, r, s]: [u8; 4]) -> Order {
     Order::new([faces[p as usize], faces[q as usize], faces[r as usize], faces[s as usize]])
 }
 

@@ -10,14 +10,15 @@ const WIDE: usize = 8;
 /// Segments that go at once.
 pub(in super::super) const BATCH: usize = 640;
 
-/// Several segments, and what is seen of them.
+/// Several segments, and what is seen of them; no two of eight lie in two lines of a cache that could lie in one.
 #[derive(Debug)]
+#[repr(C, align(64))]
 pub(in super::super) struct Batch {
+    /// Colour, premultiplied, and opacity.
+    seen: [[f32; 4]; BATCH],
     /// Those that pass from one piece into another.
     across: [u32; BATCH + WIDE],
     count: usize,
-    /// Colour, premultiplied, and opacity.
-    seen: [[f32; 4]; BATCH],
 }
 
 /// Segments to integrate, one of each in a list, [`BATCH`] at most: positions and millimetres from begin to end.

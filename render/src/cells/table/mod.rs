@@ -131,6 +131,11 @@ impl Table {
         })
     }
 
+    /// Whether there may be values between two at which nothing absorbs.
+    pub(super) fn has_clear(&self, [low, high]: [f64; 2]) -> bool {
+        self.clear.iter().any(|range| low <= range[1] && high >= range[0])
+    }
+
     /// Whether nothing absorbs between two values.
     #[inline(always)]
     pub(super) fn is_clear(&self, [low, high]: [f64; 2]) -> bool {
