@@ -87,7 +87,6 @@ struct Desk<'a> {
     projector: Projector,
     scratch: Chosen,
     log: Log,
-    list: Vec<Segment>,
     /// The most that colours have.
     most: [f32; 3],
     counts: Counts,
@@ -102,7 +101,6 @@ impl<'a> Desk<'a> {
             projector: Projector::default(),
             scratch: Chosen::default(),
             log: Log::default(),
-            list: Vec::new(),
             most: frame.table.most(),
             counts: Counts { held: frame.clusters.held(), ..Counts::default() },
         }
@@ -146,10 +144,8 @@ impl<'a> Desk<'a> {
     fn composite(&mut self, first: usize, row: &mut [[f32; 4]], lacking: Option<Early>) -> RowSegments {
         let mut kept = RowSegments::default();
         for (pixel, color) in (first..).zip(row) {
-            self.list.clear();
-            self.list.extend_from_slice(self.log.pixel(pixel));
             let kept = self.manner.keep.then_some(&mut kept);
-            *color = composite(&mut self.list, kept, &mut self.counts);
+            *color = composite(self.log.pixel(pixel), kept, &mut self.counts);
             if let Some(early) = lacking {
                 early.complete(color, self.most);
             }

@@ -135,22 +135,22 @@ pub(super) fn overlap(segments: &[Segment]) -> bool {
 
 /// Replaces segments that overlap by segments that do not: where several are, their optical depths add up and colours are
 /// weighted by them, each taken as the same all along.
-pub(super) fn add_up(segments: &mut Vec<Segment>) {
+pub(super) fn add_up(segments: &[Segment]) -> Vec<Segment> {
     // Rates of what begins and ends, by depth; in the order of the segments where depths are one.
     let mut changes: Vec<(f64, bool, [f64; 4])> = Vec::with_capacity(2 * segments.len());
-    for s in segments.iter() {
+    for s in segments {
         let length = s.back - s.front;
         let rate = s.depth().map(|d| d / length);
         changes.push((s.front, true, rate));
         changes.push((s.back, false, rate));
     }
     changes.sort_by(|a, b| a.0.total_cmp(&b.0));
-    segments.clear();
+    let mut apart = Vec::with_capacity(changes.len());
     let (mut open, mut rate, mut at) = (0_usize, [0.0_f64; 4], f64::NEG_INFINITY);
     for (depth, begins, of) in changes {
         if depth > at && open > 0 {
             let rgba = seen(rate.map(|r| (r * (depth - at)).max(0.0)));
-            segments.push(Segment { front: at, back: depth, rgba });
+            apart.push(Segment { front: at, back: depth, rgba });
         }
         at = depth;
         if begins {
@@ -162,6 +162,7 @@ pub(super) fn add_up(segments: &mut Vec<Segment>) {
             rate = if open == 0 { [0.0; 4] } else { std::array::from_fn(|c| rate[c] - of[c]) };
         }
     }
+    apart
 }
 
 /// Merges segments that meet, front to back.
@@ -181,21 +182,27 @@ pub(super) fn merge(segments: &[Segment], mut done: impl FnMut(Segment)) {
     done(run);
 }
 
-/// Composites the segments of a pixel, those of the nearest clusters first; `kept` gets its runs.
+/// Composites the segments of a pixel, those of the nearest clusters first, and puts them in order; `kept` gets its runs.
 #[inline(always)]
 pub(super) fn composite(
-    list: &mut Vec<Segment>,
+    list: &mut [Segment],
     mut kept: Option<&mut RowSegments>,
     counts: &mut Counts,
 ) -> [f32; 4] {
+    let mut apart = Vec::new();
     // What comes one behind the other is in order.
-    if overlap(list) {
+    let list = if overlap(list) {
         put_in_order(list);
         if overlap(list) {
             counts.overlapping_pixels += 1;
-            add_up(list);
+            apart = add_up(list);
+            &apart[..]
+        } else {
+            list
         }
-    }
+    } else {
+        list
+    };
     let mut color = [0.0; 4];
     let mut runs = 0;
     merge(list, |run| {

@@ -149,8 +149,8 @@ impl Log {
     }
 
     /// The segments of a pixel, when all are put together.
-    pub(super) fn pixel(&self, pixel: usize) -> &[Segment] {
-        &self.by_pixel[of_pixel(&self.ends, pixel)]
+    pub(super) fn pixel(&mut self, pixel: usize) -> &mut [Segment] {
+        &mut self.by_pixel[of_pixel(&self.ends, pixel)]
     }
 }
 

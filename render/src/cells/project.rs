@@ -89,7 +89,7 @@ impl Gathered {
     /// Integrates all that the rays of `rect` have.
     #[inline(always)]
     fn integrate<E: Eight>(&mut self, frame: &Frame<'_>, rect: &Rect) {
-        let mut batch = Batch::new();
+        let mut batch = Batch::default();
         let (mut from, mut to, mut mm) = ([0.0; BATCH], [0.0; BATCH], [0.0; BATCH]);
         let [across, _] = rect.size();
         self.seen.clear();
@@ -145,6 +145,7 @@ pub(super) struct Projector {
     shown: Vec<Shown>,
     part: Vec<Shown>,
     scanner: Box<Scanner>,
+    batch: Box<Batch>,
     open: Open,
     raws: Vec<Raw>,
     counts: Vec<u32>,
@@ -305,7 +306,6 @@ impl Projector {
         counts: &mut Counts,
     ) {
         self.open.begin(&frame.lens, tile);
-        let mut batch = Batch::new();
         let mut segments = 0;
         let part = if sink.renews() { PART } else { self.shown.len().max(1) };
         for (n, shown) in self.shown.chunks(part).enumerate() {
@@ -322,7 +322,7 @@ impl Projector {
             }
             let mut go_on = |raws: Found<'_>| {
                 segments += raws.len() as u64;
-                go_on(frame, raws, &mut batch, &mut self.open);
+                go_on(frame, raws, &mut self.batch, &mut self.open);
             };
             self.scanner.scan::<F>(of.cells(shown), [tile, tile], frame.lens.perspective(), &mut go_on);
             go_on(self.scanner.rest());
@@ -426,7 +426,7 @@ impl Projector {
                 integrate(raws, frame.table, frame.lens.stretch(at), &mut self.spans);
                 if overlap(&self.spans) {
                     counts.overlaps += 1;
-                    add_up(&mut self.spans);
+                    self.spans = add_up(&self.spans);
                 }
                 merge(&self.spans, |run| {
                     if run.rgba[3] > 0.0 {

@@ -20,6 +20,8 @@ pub(super) struct Open {
     pub(super) aside: Vec<(Segment, u32)>,
     /// Millimetres for one of depth, where that is not one everywhere.
     stretches: Vec<f64>,
+    /// Millimetres of what goes at once.
+    mm: Vec<f32>,
 }
 
 /// A run of a pixel, within a line of a cache.
@@ -45,6 +47,7 @@ impl Open {
             self.runs.resize(tile.area(), Run::NONE);
             self.last.resize(tile.area(), NONE);
         }
+        self.mm.resize(BATCH, 0.0);
         self.aside.clear();
         self.stretches.clear();
         if lens.perspective() {
@@ -81,10 +84,9 @@ pub(super) fn go_on(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open:
 
 #[inline(always)]
 fn go_on_by<E: Eight>(frame: &Frame<'_>, raws: Found<'_>, batch: &mut Batch, open: &mut Open) {
-    let mut mm = [0.0; BATCH];
     for first in (0..raws.len()).step_by(BATCH) {
         let raws = raws.part(first, BATCH);
-        let mm = &mut mm[..raws.len()];
+        let mm = &mut open.mm[..raws.len()];
         let spans = raws.fronts.iter().zip(raws.backs).map(|(front, back)| back - front);
         if frame.lens.perspective() {
             for ((mm, span), &pixel) in mm.iter_mut().zip(spans).zip(raws.pixels) {

@@ -83,12 +83,14 @@ fn under<E: Eight>(seen: &mut [E; 4], behind: [E; 4]) {
     }
 }
 
-impl Batch {
+impl Default for Batch {
     /// With nothing in it.
-    pub(in super::super) fn new() -> Self {
+    fn default() -> Self {
         Self { across: [0; BATCH + WIDE], count: 0, seen: [[0.0; 4]; BATCH] }
     }
+}
 
+impl Batch {
     /// Colour, premultiplied, and opacity of what was last integrated.
     #[inline(always)]
     pub(in super::super) fn seen(&self) -> &[[f32; 4]; BATCH] {

@@ -143,7 +143,7 @@ fn at_once_by<E: Eight>(table: &Table, segments: &[([f32; 2], f32)]) -> Vec<[f32
 fn of_all(segments: &[([f32; 2], f32)], integrate: impl FnOnce(&mut Batch, Stretches<'_>)) -> Vec<[f32; 4]> {
     let of = |part: fn(&([f32; 2], f32)) -> f32| -> Vec<f32> { segments.iter().map(part).collect() };
     let [from, to, mm] = [of(|s| s.0[0]), of(|s| s.0[1]), of(|s| s.1)];
-    let mut batch = Batch::new();
+    let mut batch = Batch::default();
     integrate(&mut batch, Stretches { from: &from, to: &to, mm: &mm });
     batch.seen()[..segments.len()].to_vec()
 }
