@@ -163,7 +163,7 @@ struct Drawing<'a> {
 
 impl Sink for Drawing<'_> {
     fn is_early(&self) -> bool {
-        self.ending.is_some()
+        self.ending.as_ref().is_some_and(Ending::is_near)
     }
 
     fn hides(&mut self, rect: &Rect, nearest: f64) -> bool {

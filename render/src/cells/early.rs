@@ -12,7 +12,7 @@ use super::fold::Segment;
 use super::runs::Run;
 use super::scan::Rect;
 
-/// Where a pixel lets less through, some may be terminated soon.
+/// Where a pixel lets less through, or less than twice what terminates it, some may be soon; none is before.
 const SOON: f32 = 0.1;
 
 /// When to give up what lies behind.
@@ -187,6 +187,11 @@ impl Ending {
         hides
     }
 
+    /// Whether some pixels are terminated, or may be soon; before that nothing is hidden.
+    pub(super) fn is_near(&self) -> bool {
+        self.least <= SOON.max(2.0 * (1.0 - self.threshold))
+    }
+
     /// Whether something was left out.
     pub(super) fn lacks(&self) -> bool {
         self.lacks
@@ -210,9 +215,6 @@ impl Ending {
 
     /// Takes a look at runs that are not finished, of the pixels of a tile within the rectangle.
     pub(super) fn look_at(&mut self, [rect, tile]: [&Rect; 2], runs: &[Run]) {
-        if self.least > SOON {
-            return;
-        }
         let [across, _] = tile.size();
         for (y, runs) in (tile.low[1]..tile.high[1]).zip(runs.chunks_exact(across)) {
             let first = rect.number([tile.low[0], y]);
