@@ -147,7 +147,7 @@ impl InView {
                 continue;
             }
             (near, far) = (near.least(least), far.most(most));
-            let nearest = (nearest - nearest.abs() * f64::from(f32::EPSILON)) as f32;
+            let nearest = ((nearest - nearest.abs() * f64::from(f32::EPSILON)) as f32).min(f32::MAX);
             chosen.cells.push(Shown { corners: *tetrahedron, tetrahedron: index as u32, nearest, reach });
             chosen.depths.push(depth);
         }
