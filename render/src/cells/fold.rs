@@ -189,7 +189,7 @@ pub(super) fn composite(
     mut kept: Option<&mut RowSegments>,
     counts: &mut Counts,
 ) -> [f32; 4] {
-    let mut apart = Vec::new();
+    let apart;
     // What comes one behind the other is in order.
     let list = if overlap(list) {
         put_in_order(list);

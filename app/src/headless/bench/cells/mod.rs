@@ -1,6 +1,6 @@
 //! `cells`: what early ray termination, sharing and balancing save in drawing an unstructured grid, for 1 to 8 workers.
 //!
-//! Source: Takayama, tables 1 and 2: each of the six levels there, of a view along the grid's longest side in 300×300 pixels,
+//! Source: Takayama, tables 1 and 2: each of the six levels there, and two as the program spreads cells, of a view along the grid's longest side in 300×300 pixels,
 //! and of one across it in 900×300. Times are of threads, work is of workers with clocks of their own, since a machine may
 //! have fewer cores than workers.
 
@@ -42,14 +42,17 @@ const VIEWS: [(&str, bool, [u32; 2]); 3] =
 /// Early termination as in the paper, but for subscreens as large as cells are in the picture.
 const EARLY: Early = Early { subscreens: None, ..Early::TAKAYAMA };
 
-/// Takayama's levels: name, early termination, sharing, balancing.
-const LEVELS: [(&str, Option<Early>, bool, bool); 6] = [
-    ("base", None, false, false),
-    ("DLB", None, false, true),
-    ("ERT", Some(EARLY), false, false),
-    ("ERT+share", Some(EARLY), true, false),
-    ("ERT+DLB", Some(EARLY), false, true),
-    ("ERT+DLB+share", Some(EARLY), true, true),
+/// Takayama's levels, of workers with a part of the grid each, and two of them of workers with a band of the picture each, as
+/// the program spreads cells: name, early termination, sharing, balancing, spread.
+const LEVELS: [(&str, Option<Early>, bool, bool, Spread); 8] = [
+    ("base", None, false, false, Spread::Blocks),
+    ("DLB", None, false, true, Spread::Blocks),
+    ("ERT", Some(EARLY), false, false, Spread::Blocks),
+    ("ERT+share", Some(EARLY), true, false, Spread::Blocks),
+    ("ERT+DLB", Some(EARLY), false, true, Spread::Blocks),
+    ("ERT+DLB+share", Some(EARLY), true, true, Spread::Blocks),
+    ("DLB, bands", None, false, true, Spread::Columns),
+    ("ERT+DLB+share, bands", Some(EARLY), true, true, Spread::Columns),
 ];
 
 /// Measures on the first grid of a file, or on a made one; beside a peer where one is given.
@@ -93,9 +96,8 @@ fn levels(
     };
     let truth = known(item, camera, size, COMPARED)?;
     for workers in WORKERS {
-        let options = LEVELS.map(|(_, early, share, balance)| {
-            let workers = Some(workers);
-            let (spread, engine) = (Spread::Blocks, Engine::Threads);
+        let options = LEVELS.map(|(_, early, share, balance, spread)| {
+            let (workers, engine) = (Some(workers), Engine::Threads);
             Options { early, share, balance, workers, engine, spread, ..Options::default() }
         });
         let mut least = [f64::INFINITY; LEVELS.len()];
