@@ -1,8 +1,8 @@
 //! `cells`: what early ray termination, sharing and balancing save in drawing an unstructured grid, for 1 to 8 workers.
 //!
-//! Source: Takayama, tables 1 and 2: each of the six levels there, and two as the program spreads cells, of a view along the grid's longest side in 300×300 pixels,
-//! and of one across it in 900×300. Times are of threads, work is of workers with clocks of their own, since a machine may
-//! have fewer cores than workers.
+//! Source: Takayama, tables 1 and 2: each of the six levels there, and two as the program spreads cells, of a view along the
+//! grid's longest side in 300×300 pixels, and of one across it in 900×300. Times are of threads, work is of workers with clocks
+//! of their own, since a machine may have fewer cores than workers.
 
 mod beside;
 mod figures;
