@@ -278,13 +278,13 @@ mod wide {
             let [Self(a), Self(b), Self(c), Self(d)] =
                 [Self::from_array(a), Self::from_array(b), Self::from_array(c), Self::from_array(d)];
             unsafe {
-                let (ab, cd) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
-                let (ba, dc) = (_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+                let (even, more_even) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+                let (odd, more_odd) = (_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
                 [
-                    Self(_mm256_permute2f128_pd::<0x20>(ab, cd)),
-                    Self(_mm256_permute2f128_pd::<0x20>(ba, dc)),
-                    Self(_mm256_permute2f128_pd::<0x31>(ab, cd)),
-                    Self(_mm256_permute2f128_pd::<0x31>(ba, dc)),
+                    Self(_mm256_permute2f128_pd::<0x20>(even, more_even)),
+                    Self(_mm256_permute2f128_pd::<0x20>(odd, more_odd)),
+                    Self(_mm256_permute2f128_pd::<0x31>(even, more_even)),
+                    Self(_mm256_permute2f128_pd::<0x31>(odd, more_odd)),
                 ]
             }
         }
