@@ -18,9 +18,9 @@ pub(crate) trait Four: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     /// The greater of each two; the other's where either is not a number.
     fn most(self, other: Self) -> Self;
     /// Which are less than the other's, a bit each.
-    fn below(self, other: Self) -> u32;
+    fn bits_below(self, other: Self) -> u32;
     /// One number or another, by whether these are less than those of a limit.
-    fn either(self, limit: Self, yes: Self, no: Self) -> Self;
+    fn below(self, limit: Self, yes: Self, no: Self) -> Self;
     fn from_whole(v: [i32; 4]) -> Self;
     /// Without what comes after the point.
     fn to_whole(self) -> [i32; 4];
@@ -98,12 +98,12 @@ impl Four for Plain {
     }
 
     #[inline(always)]
-    fn below(self, other: Self) -> u32 {
+    fn bits_below(self, other: Self) -> u32 {
         (0..4).fold(0, |bits, n| bits | u32::from(self.0[n] < other.0[n]) << n)
     }
 
     #[inline(always)]
-    fn either(self, limit: Self, yes: Self, no: Self) -> Self {
+    fn below(self, limit: Self, yes: Self, no: Self) -> Self {
         Self(std::array::from_fn(|n| if self.0[n] < limit.0[n] { yes.0[n] } else { no.0[n] }))
     }
 
@@ -222,12 +222,12 @@ mod wide {
         }
 
         #[inline(always)]
-        fn below(self, other: Self) -> u32 {
+        fn bits_below(self, other: Self) -> u32 {
             unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
         }
 
         #[inline(always)]
-        fn either(self, limit: Self, yes: Self, no: Self) -> Self {
+        fn below(self, limit: Self, yes: Self, no: Self) -> Self {
             Self(unsafe { _mm256_blendv_pd(no.0, yes.0, _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, limit.0)) })
         }
 

@@ -31,11 +31,11 @@ impl Outline {
         let (first, step) = (c * part, b * part);
         // What is no number bounds nothing either: see `columns`.
         self.left = [
-            none.either(a, first, F::all(f64::NEG_INFINITY)).to_array(),
-            none.either(a, step, none).to_array(),
+            none.below(a, first, F::all(f64::NEG_INFINITY)).to_array(),
+            none.below(a, step, none).to_array(),
         ];
         self.right =
-            [a.either(none, first, F::all(f64::INFINITY)).to_array(), a.either(none, step, none).to_array()];
+            [a.below(none, first, F::all(f64::INFINITY)).to_array(), a.below(none, step, none).to_array()];
     }
 
     /// Of four rows: the first column of each, and the one behind its last. Columns are those from `low` up to but not at
@@ -49,7 +49,7 @@ impl Outline {
         }
         // Within what whole numbers there are.
         (left, right) = (left.least(F::all(f64::from(high))), right.most(F::all(f64::from(low - 1))));
-        right = F::all(f64::from(last)).either(rows, F::all(f64::from(low - 1)), right);
+        right = F::all(f64::from(last)).below(rows, F::all(f64::from(low - 1)), right);
         [(left + F::all(NEXT)).to_whole(), (right + F::all(1.0)).to_whole()]
     }
 }

@@ -95,10 +95,11 @@ impl<F: Four> Faces<F> {
         let (a, b) = (nx * part, ny * part);
         let c = (first(z) - a * first(x)) - b * first(y);
         let (deep, length) = (u[2].abs() + v[2].abs(), nx.abs() + ny.abs());
-        let narrow = (nz.abs() * deep).below(length * F::all(NARROW));
+        let narrow = (nz.abs() * deep).bits_below(length * F::all(NARROW));
         // Where a corner has no rank, c is not a number.
-        let known =
-            (size_z * F::all(CANCELLED)).below(nz.abs()) & c.abs().below(F::all(f64::INFINITY)) & !narrow;
+        let known = (size_z * F::all(CANCELLED)).bits_below(nz.abs())
+            & c.abs().bits_below(F::all(f64::INFINITY))
+            & !narrow;
         let (normal, size) = ([nx, ny, nz], [size_x, size_y, size_z]);
         Self { places: [x, y, z], scalars, a, b, c, normal, size, part, known }
     }
@@ -234,11 +235,11 @@ impl Cell {
         let volume = ((dx * nx + dy * ny) + dz * nz).to_array()[1];
         // Written so that what is not a number is not plain; from one eye a corner that is not before it has no rank.
         let full = volume.abs() >= FLAT * (spread[0] * spread[1] * spread[2]) && volume.is_finite();
-        if !(full && (perspective || z.below(none) == 0)) {
+        if !(full && (perspective || z.bits_below(none) == 0)) {
             return None;
         }
         let turned = if volume < 0.0 { ALL & !EVEN } else { EVEN };
-        let mut near = none.below(nz) ^ turned;
+        let mut near = none.bits_below(nz) ^ turned;
         let (mut a, mut b, mut c) = (faces.a, faces.b, faces.c);
         // What rounding may have done to a plane over the cell.
         let (wide, high) = (spreads.picked::<0b00_00_00_00>(), spreads.picked::<0b01_01_01_01>());
@@ -327,7 +328,7 @@ impl Cell {
         };
         let depths = [depth(enter), depth(leave)];
         let values = [value(enter, depths[0]), value(leave, depths[1])];
-        Passed { hit: none.below(inside), clear: none.below(clear), depths, values }
+        Passed { hit: none.bits_below(inside), clear: none.bits_below(clear), depths, values }
     }
 }
 
