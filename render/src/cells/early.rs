@@ -19,7 +19,7 @@ const SOON: f32 = 0.1;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Early {
     /// Opacity from which a pixel is terminated; 0 < threshold < 1. The picture differs from that without termination by at
-    /// most (1 - threshold) / 2 in every channel.
+    /// most (1 - threshold) / 2 in every channel, and rounding in single precision: under 1e-5.
     pub threshold: f64,
     /// Into how many subscreens the longer side of the picture is cut; where none is given, such that they are as large as
     /// cells are in the picture.

@@ -2,15 +2,13 @@
 //! back. That is the same for any part of the picture, so that runs of cells are merged in one order everywhere.
 
 use super::project::Frame;
-use super::scan::{Cells, Corner, Rect, Shown};
+use super::scan::{Cells, Corner, NEXT, Rect, Shown};
 use super::stats::Counts;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::WideFour;
 use crate::simd::{Four, PlainFour};
 use crate::volume::cells::Place;
 
-/// A little less than to the next pixel.
-const NEXT: f64 = 1.0 - 1e-9;
 /// Steps of depth in which cells are told apart for going through them from front to back.
 const STEPS: usize = 1024;
 
@@ -135,7 +133,7 @@ impl InView {
             let (least, most) = (p.least(q).least(r.least(s)), p.most(q).most(r.most(s)));
             let ([_, _, least_w, nearest], [_, _, most_w, farthest]) = (least.to_array(), most.to_array());
             let reach = if least_w == 1.0 && most_w == 1.0 {
-                // Within the picture there are whole numbers for all; a little more to the left and up does no harm.
+                // Within the picture there are whole numbers for all; a pixel more where a place is rounded to it does no harm.
                 let [left, top, ..] = (least.most(first).least(last + one) + F::all(NEXT)).to_whole();
                 let [right, bottom, ..] = (most.most(first - one).least(last) + one).to_whole();
                 Rect { low: [left, top], high: [right, bottom] }

@@ -73,7 +73,9 @@ impl Lens {
             let [x, y] = [x * weight + mx, y * weight + my];
             return Corner { x, y, w: 1.0, z, rank: -weight, scalar };
         }
-        Corner { x: x + mx * z, y: y + my * z, w: z, z, rank: f64::NAN, scalar }
+        // One would say that it was divided.
+        let w = if z == 1.0 { z.next_up() } else { z };
+        Corner { x: x + mx * w, y: y + my * w, w, z, rank: f64::NAN, scalar }
     }
 
     /// Millimetres along a pixel's ray for one of depth.

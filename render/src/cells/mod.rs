@@ -88,6 +88,8 @@ use worker::{Gathered, Manner};
 
 /// The largest picture: 16 384 × 16 384.
 pub const MAX_PIXELS: u64 = 1 << 28;
+/// Pixels that it is wide or high at most: places are told apart to a thousandth of a millionth of a pixel.
+pub const MAX_SIDE: u32 = 1 << 20;
 
 /// Workers at most.
 pub const MAX_WORKERS: usize = 1024;
@@ -138,8 +140,10 @@ pub enum CellsError {
     /// The camera shows nothing.
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// A side is zero, or there are more pixels than [`MAX_PIXELS`].
-    #[error("a picture of {width} by {height} pixels cannot be drawn: take 1 to {MAX_PIXELS} pixels in all")]
+    /// A side is zero or longer than [`MAX_SIDE`], or there are more pixels than [`MAX_PIXELS`].
+    #[error(
+        "a picture of {width} by {height} pixels cannot be drawn: take sides of 1 to {MAX_SIDE} pixels and {MAX_PIXELS} in all at most"
+    )]
     Size {
         /// As asked for.
         width: u32,
@@ -270,7 +274,7 @@ impl CellRenderer {
         let begin = Instant::now();
         let [width, height] = size;
         let pixels = u64::from(width) * u64::from(height);
-        if pixels == 0 || pixels > MAX_PIXELS {
+        if pixels == 0 || pixels > MAX_PIXELS || width.max(height) > MAX_SIDE {
             return Err(CellsError::Size { width, height });
         }
         if options.early.is_some_and(|early| {

@@ -301,3 +301,35 @@ mod wide {
         }
     }
 }
+
+#[cfg(test)]
+#[cfg(target_arch = "x86_64")]
+mod tests {
+    use super::{Four, Order, Plain, Wide};
+
+    /// What each has of rows that all give the same of.
+    fn all<F: Four>(rows: [[f64; 4]; 4], order: [u8; 4]) -> Vec<[u64; 4]> {
+        let [a, b, c, d] = rows.map(F::from_array);
+        let [p, q, r, s] = F::columns(rows);
+        let results =
+            [p, q, r, s, F::sums([a, b, c, d]), a.ordered(&Order::new(order)), a.picked::<0b01_11_00_10>()];
+        results.map(|of| of.to_array().map(f64::to_bits)).to_vec()
+    }
+
+    #[test]
+    fn numbers_are_put_in_order_and_added_alike() {
+        if !crate::simd::has_wide() {
+            return;
+        }
+        let row = |from: f64| [from, -1.0 / from, from * 1e300, from * 1e-320];
+        for n in 0..256_u32 {
+            let order = [0, 2, 4, 6].map(|bit| (n >> bit) as u8 & 3);
+            let rows = [1.1, 2.3, 3.7, f64::from(n) + 0.1].map(row);
+            let plain = all::<Plain>(rows, order);
+            assert_eq!(plain, all::<Wide>(rows, order));
+            assert_eq!(plain[5], order.map(|n| rows[0][usize::from(n)].to_bits()));
+            assert_eq!(plain[1], rows.map(|row| row[1].to_bits()));
+            assert_eq!(f64::from_bits(plain[4][0]), (rows[0][0] + rows[0][1]) + (rows[0][2] + rows[0][3]));
+        }
+    }
+}

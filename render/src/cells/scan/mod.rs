@@ -18,6 +18,9 @@ use planes::Passed;
 use scanner::ROOM;
 pub(super) use scanner::{Cells, PIXELS, Scanner};
 
+/// A little less than to the next pixel: of a place and this, the whole number is the first pixel that does not lie before it, or
+/// one that does so by rounding.
+pub(super) const NEXT: f64 = 1.0 - 1e-9;
 /// Pixels that go at once.
 const LANES: usize = 4;
 
@@ -107,7 +110,7 @@ impl Rect {
 
     /// The pixels whose middles lie between two places.
     #[inline(always)]
-    pub(super) fn between(low: [f64; 2], high: [f64; 2]) -> Self {
+    fn between(low: [f64; 2], high: [f64; 2]) -> Self {
         // `as` saturates; one more keeps the range half open.
         Self { low: low.map(|v| v.ceil() as i32), high: high.map(|v| (v.floor() as i32).saturating_add(1)) }
     }
@@ -251,17 +254,10 @@ pub(super) struct Shown {
     /// Numbers of its corners in its cluster.
     pub(super) corners: [u16; 4],
     pub(super) tetrahedron: u32,
-    /// Depth of its nearest corner, or a little less.
+    /// Depth of its nearest corner, or a little less; what is far below a micrometre may be one.
     pub(super) nearest: f32,
     pub(super) reach: Rect,
 }
 
 /// A tetrahedron: its corners, in the order of their numbers, and its scalar where that is one for all of it.
 pub(super) type Tetrahedron<'a> = ([&'a Corner; 4], Option<f64>);
-
-/// The scalar of each corner.
-#[inline(always)]
-fn scalars((corners, constant): &Tetrahedron<'_>) -> [f64; 4] {
-    let [p, q, r, s] = corners;
-    constant.map_or([p.scalar, q.scalar, r.scalar, s.scalar], |value| [value; 4])
-}

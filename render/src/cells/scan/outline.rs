@@ -3,10 +3,8 @@
 //! A ray passes where all planes of near faces rank below all those of far ones. Each such pair of planes ranks alike along the
 //! line of the edge that it shares, an edge of the outline, which rows cross at places that run linearly from row to row.
 
+use super::NEXT;
 use crate::simd::Four;
-
-/// A little less than to the next column.
-const NEXT: f64 = 1.0 - 1e-9;
 
 /// Columns that bound a cell to the left and to the right, by the lines of its edges: on the row of pixels 0, and how much more
 /// on each row further down. Without end where a line does not bound it to that side.

@@ -195,10 +195,9 @@ pub(super) struct Cell {
     /// Differences of rank which rounding may have made: between near faces, first and second, first and third, second and
     /// third; and between others.
     unsure: [f64; 4],
-    /// The scalar of the first corner, and what it changes: at the first pixel; for one to the right, down, and in rank. Where
-    /// rays come from one eye the change is to be multiplied by depth.
+    /// The scalar of the first corner, and what it changes: for one pixel to the right, down, and in rank, and at the first pixel.
+    /// Where rays come from one eye the change is to be multiplied by depth.
     from: f64,
-    at_first: f64,
     change: [f64; 4],
 }
 
@@ -211,7 +210,6 @@ impl Cell {
         near: 0,
         unsure: [0.0; 4],
         from: 0.0,
-        at_first: 0.0,
         change: [0.0; 4],
     };
 
@@ -280,11 +278,10 @@ impl Cell {
         let unsure = unsure.ordered(&orders.all);
         let pairs = unsure.picked::<0b11_01_00_00>().most(unsure.picked::<0b11_10_10_01>());
         self.unsure = pairs.to_array();
-        let change = (sums * F::all(1.0 / volume)).to_array();
+        let [right, down, back, _] = (sums * F::all(1.0 / volume)).to_array();
         let first = of.0[0];
         self.from = scalars.to_array()[0];
-        self.at_first = -((change[0] * first.x + change[1] * first.y) + change[2] * first.rank);
-        self.change = change;
+        self.change = [right, down, back, -((right * first.x + down * first.y) + back * first.rank)];
         Some(())
     }
 
@@ -320,7 +317,7 @@ impl Cell {
             }
         }
         let none = F::all(0.0);
-        let along = (F::all(self.at_first) + F::all(self.change[1]) * y) + F::all(self.change[0]) * x;
+        let along = (F::all(self.change[3]) + F::all(self.change[1]) * y) + F::all(self.change[0]) * x;
         let depth = |rank: F| if PERSPECTIVE { (none - rank).inverse() } else { rank };
         let value = |rank: F, depth: F| {
             let change = along + F::all(self.change[2]) * rank;

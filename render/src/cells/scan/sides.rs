@@ -13,7 +13,7 @@
 use std::cmp::Ordering;
 
 use super::planes::{Planes, depth};
-use super::{Corner, FACES, LANES, Raws, Rect, Tetrahedron, scalars};
+use super::{Corner, FACES, LANES, Raws, Rect, Tetrahedron};
 
 /// One of each pixel of a group, where no access of memory straddles two lines of a cache.
 #[derive(Debug, Clone, Copy)]
@@ -219,6 +219,13 @@ impl<'a> Sides<'a> {
         let on_plane = || depth(self.planes.rank(face, at), self.perspective);
         [if self.planes.known(face) { on_plane() } else { z }, value]
     }
+}
+
+/// The scalar of each corner.
+#[inline(always)]
+fn scalars((corners, constant): &Tetrahedron<'_>) -> [f64; 4] {
+    let [p, q, r, s] = corners;
+    constant.map_or([p.scalar, q.scalar, r.scalar, s.scalar], |value| [value; 4])
 }
 
 /// On which side of each edge the ray of a pixel passes, a bit each, set where the area is less than nothing.

@@ -153,6 +153,8 @@ fn what_cannot_be_drawn_is_said() {
     );
     let large = Err(CellsError::Size { width: 1 << 15, height: 1 << 15 });
     assert_eq!(draw(&item, &camera, [1 << 15; 2], &options), large, "too many pixels");
+    let long = Err(CellsError::Size { width: MAX_SIDE + 1, height: 1 });
+    assert_eq!(draw(&item, &camera, [MAX_SIDE + 1, 1], &options), long, "too long a side");
     let blind = Camera { target: camera.eye, ..camera };
     assert_eq!(
         draw(&item, &blind, SIZE, &options),

@@ -176,6 +176,24 @@ fn early_termination_stays_within_its_bound_and_saves_work() {
 }
 
 #[test]
+fn within_large_clusters_early_termination_looks_at_what_is_not_finished() {
+    let (item, camera) = dense(40);
+    let whole = draw(&item, &camera, SIZE, &workers(2, Engine::Blocks));
+    let mut before = 0;
+    for threshold in [0.9999, 1.0 - 1.0 / 256.0, 0.9, 0.6, 0.2] {
+        let options =
+            Options { early: Some(Early { threshold, ..Early::default() }), ..workers(2, Engine::Blocks) };
+        let picture = draw(&item, &camera, SIZE, &options);
+        let pairs = picture.image.pixels.iter().flatten().zip(whole.image.pixels.iter().flatten());
+        let off = pairs.fold(0.0, |off: f64, (a, b)| off.max(f64::from((a - b).abs())));
+        assert!(off <= 0.5 * (1.0 - threshold) + 1e-5, "{threshold}: off by {off}");
+        let hidden = picture.stats.total.hidden;
+        assert!(hidden > before, "{threshold}: {hidden} cells hidden, {before} by one that is nearer to 1");
+        before = hidden;
+    }
+}
+
+#[test]
 fn work_is_shared_out_evenly_and_termination_is_shared() {
     let (item, camera) = dense(22);
     let early = Some(Early::default());
