@@ -25,18 +25,15 @@ pub(super) fn queues(frame: &Frame<'_>, workers: usize, spread: Spread) -> Vec<V
             i64::from(rect.low[1]) + i64::from(rect.high[1])
         };
         all.sort_unstable_by_key(|&cluster| (middle(cluster), cluster));
-        for (worker, queue) in queues.iter_mut().enumerate() {
-            let [from, to] = [worker, worker + 1].map(|w| all.len() * w / workers);
-            queue.extend_from_slice(&all[from..to]);
-        }
-    } else {
-        let total: usize = (0..frame.clusters.len()).map(|c| frame.clusters.count(c)).sum();
-        let mut before = 0;
-        for cluster in all {
-            let worker = before * workers / total.max(1);
-            queues[worker.min(workers - 1)].push(cluster);
-            before += frame.clusters.count(cluster as usize);
-        }
+    }
+    let total: usize = (0..frame.clusters.len()).map(|c| frame.clusters.count(c)).sum();
+    let mut before = 0;
+    for cluster in all {
+        let count = frame.clusters.count(cluster as usize);
+        // Where its middle lies; of two that share that the first, which is where all cells are to begin with.
+        let worker = ((2 * before + count) * workers).div_ceil((2 * total).max(1));
+        queues[worker.clamp(1, workers) - 1].push(cluster);
+        before += count;
     }
     for queue in &mut queues {
         queue.sort_unstable_by_key(|&cluster| {

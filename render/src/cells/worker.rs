@@ -329,9 +329,13 @@ impl<'a, L: Link> Worker<'a, L> {
         lacking.map(|&cluster| Pack::of(clusters, scalars, cluster)).collect()
     }
 
-    /// Every third of the clusters left, so that near and far ones go with it; the last one too.
+    /// Every third of the clusters left, so that near and far ones go with it.
     fn give(&mut self) -> Vec<u32> {
-        let (mut given, mut position) = (Vec::new(), 0);
+        let mut given = Vec::new();
+        if self.queue.len() < 2 {
+            return given;
+        }
+        let mut position = 0;
         // Two stay and one goes, from the farthest on.
         self.queue.retain(|&cluster| {
             position += 1;
@@ -347,7 +351,7 @@ impl<'a, L: Link> Worker<'a, L> {
     /// Tells the others how much is left, where that has changed enough to matter.
     fn tell(&mut self) -> Result<(), LinkError> {
         let left = self.queue.len() as u32;
-        let changed = left + left / 8 < self.told || left > self.told || (left == 0 && self.told > 0);
+        let changed = left + left / 8 < self.told || left > self.told || (left < 2 && self.told >= 2);
         if self.manner.balance && changed {
             self.told = left;
             self.send_all(&Message::Left(left))?;
@@ -366,7 +370,7 @@ impl<'a, L: Link> Worker<'a, L> {
             return Ok(Step::Waiting);
         }
         let me = self.link.rank();
-        let others = self.left.iter().enumerate().filter(|&(rank, &left)| rank != me && left > 0);
+        let others = self.left.iter().enumerate().filter(|&(rank, &left)| rank != me && left >= 2);
         // Of equals the next in number, so that not all ask the same one.
         let size = self.link.size();
         let fullest = others.max_by_key(|&(rank, &left)| (left, (me + size - rank) % size)).map(|o| o.0);

@@ -194,6 +194,14 @@ fn within_large_clusters_early_termination_looks_at_what_is_not_finished() {
 }
 
 #[test]
+fn clusters_of_many_sizes_are_dealt_out_by_their_cells() {
+    let (item, camera) = dense(23);
+    let options = Options { balance: false, ..workers(8, Engine::Simulated) };
+    let dealt = draw(&item, &camera, [96, 90], &options).stats.imbalance();
+    assert!(dealt < 1.12, "by their number it would be 1.2: {dealt}");
+}
+
+#[test]
 fn work_is_shared_out_evenly_and_termination_is_shared() {
     let (item, camera) = dense(22);
     let early = Some(Early::default());
