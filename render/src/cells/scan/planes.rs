@@ -59,7 +59,11 @@ impl Planes {
 /// Depth of a rank.
 #[inline(always)]
 pub(super) fn depth(rank: f64, perspective: bool) -> f64 {
-    if perspective { -1.0 / rank } else { rank }
+    if !perspective {
+        return rank;
+    }
+    // Of what lies farther away than rounding can tell it is as far as there are numbers.
+    if rank < 0.0 { -1.0 / rank } else { f64::MAX }
 }
 
 /// Planes of the faces with what they are worked out from: one of each face, or of each corner.
@@ -325,7 +329,9 @@ impl Cell {
         };
         let depths = [depth(enter), depth(leave)];
         let values = [value(enter, depths[0]), value(leave, depths[1])];
-        Passed { hit: none.bits_below(inside), clear: none.bits_below(clear), depths, values }
+        // What has no depth before the eye is left to the others.
+        let before = if PERSPECTIVE { leave.bits_below(none) } else { ALL };
+        Passed { hit: none.bits_below(inside), clear: none.bits_below(clear) & before, depths, values }
     }
 }
 

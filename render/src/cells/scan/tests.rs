@@ -106,3 +106,32 @@ fn pixels_are_those_that_exact_predicates_pass_in_the_same_order() {
         }
     }
 }
+
+#[test]
+fn cells_that_reach_from_the_eye_to_where_depth_is_lost_have_depths_and_values() {
+    let mut state = 5;
+    let mut corners = Vec::new();
+    for _ in 0..300 {
+        for far in [false, false, true, true] {
+            let [x, y] = [random(&mut state) * 90.0 + 3.0, random(&mut state) * 66.0 + 5.0];
+            // Rays pass far corners only on the middles of pixels.
+            let [x, y] = if far { [x.round(), y.round()] } else { [x, y] };
+            let z = if far { 1e13 } else { 2e-6 } * (1.0 + random(&mut state));
+            corners.push(Corner { x, y, w: 1.0, z, rank: -1.0 / z, scalar: random(&mut state) });
+        }
+    }
+    let cell = |n: u16| Shown {
+        corners: [0, 1, 2, 3].map(|k| 4 * n + k),
+        tetrahedron: u32::from(n),
+        nearest: 0.0,
+        reach: Rect::around(&corners[4 * usize::from(n)..][..4], &TILE),
+    };
+    let shown: Vec<Shown> = (0..300).map(cell).filter(|shown| !shown.reach.is_empty()).collect();
+    let found = scanned::<PlainFour>(Cells { corners: &corners, constants: &[], shown: &shown }, true);
+    assert!(found.len() > 10_000, "{} rays", found.len());
+    assert!(found.iter().any(|&(_, [_, back], _)| back == f64::MAX), "some end where no depth is");
+    for (pixel, [front, back], values) in found {
+        assert!(front >= 0.0 && back > front && back.is_finite(), "{pixel}: from {front} to {back}");
+        assert!(values.iter().all(|v| (-1e-3..1.001).contains(v)), "{pixel}: {values:?}");
+    }
+}
