@@ -91,6 +91,12 @@ pub const MAX_PIXELS: u64 = 1 << 28;
 /// Pixels that it is wide or high at most: places are told apart to a thousandth of a millionth of a pixel.
 pub const MAX_SIDE: u32 = 1 << 20;
 
+/// Whether a picture has pixels, and no more than it may.
+fn can_be_drawn(size: [u32; 2]) -> bool {
+    let pixels = size.into_iter().map(u64::from).product();
+    (1..=MAX_PIXELS).contains(&pixels) && size.iter().all(|&side| side <= MAX_SIDE)
+}
+
 /// Workers at most.
 pub const MAX_WORKERS: usize = 1024;
 
@@ -272,9 +278,8 @@ impl CellRenderer {
         grain: Grain,
     ) -> Result<Ready, CellsError> {
         let begin = Instant::now();
-        let [width, height] = size;
-        let pixels = u64::from(width) * u64::from(height);
-        if pixels == 0 || pixels > MAX_PIXELS || width.max(height) > MAX_SIDE {
+        if !can_be_drawn(size) {
+            let [width, height] = size;
             return Err(CellsError::Size { width, height });
         }
         if options.early.is_some_and(|early| {

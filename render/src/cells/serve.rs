@@ -9,7 +9,7 @@ use super::project::Frame;
 use super::spread::queues;
 use super::table::Table;
 use super::worker::{Start, Worker};
-use super::{CellsError, MAX_PIXELS, MAX_SIDE};
+use super::{CellsError, can_be_drawn};
 use crate::simd::has_wide;
 use crate::volume::cells::Place;
 
@@ -70,10 +70,7 @@ impl<L: Link> Server<L> {
         scalars: &mut Scalars,
     ) -> Result<(), CellsError> {
         let Drawing { number, size, spread, manner, .. } = *drawing;
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let sound = (1..=MAX_PIXELS).contains(&pixels)
-            && size[0].max(size[1]) <= MAX_SIDE
-            && scalars.ranges().len() == clusters.len();
+        let sound = can_be_drawn(size) && scalars.ranges().len() == clusters.len();
         if !sound {
             return Err(LinkError::Message { rank: 0 }.into());
         }

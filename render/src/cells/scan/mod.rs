@@ -254,7 +254,7 @@ pub(super) struct Shown {
     /// Numbers of its corners in its cluster.
     pub(super) corners: [u16; 4],
     pub(super) tetrahedron: u32,
-    /// Depth of its nearest corner, or a little less; what is far below a micrometre may be one.
+    /// Depth of its nearest corner, or a little less; more only where that is too little for such a number, some 1e-45 mm.
     pub(super) nearest: f32,
     pub(super) reach: Rect,
 }
